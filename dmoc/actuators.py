@@ -1,0 +1,136 @@
+"""What pushes: how controls become a force, and which controls are allowed."""
+
+from __future__ import annotations
+
+from abc import ABC
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.checks import limits
+from dmoc.rows import Row
+
+
+class Actuator(ABC):
+    """Controls u of one node and the force they make. A force actuator's controls are its force [N].
+
+    Fields named in `adjustable` may change from one solve to the next without a rebuild; inside
+    `force` and `rows` they may be symbols.
+    """
+
+    adjustable: ClassVar[tuple[str, ...]] = ()
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the actuator has no meaning in this many dimensions."""
+
+    def size(self, dimension: int) -> int:
+        """Number of controls at a node."""
+        return dimension
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        """A name for each control, used in row names and result files."""
+        return tuple("xyz"[:dimension])
+
+    def units(self, dimension: int) -> tuple[str, ...]:
+        """The unit of each control."""
+        return ("N",) * self.size(dimension)
+
+    def force(self, u: Any) -> Any:
+        """Force on the body [N] made by the controls."""
+        return u
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper limits of the controls."""
+        limit = np.full(self.size(dimension), np.inf)
+        return -limit, limit
+
+    def rows(self, u: Any) -> list[Row]:
+        """Further limits that are not plain bounds, dimensionless."""
+        return []
+
+    def force_limit(self) -> float | None:
+        """The largest force [N] along one axis, or None if there is no limit."""
+        return None
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        """By how much the controls, shape (count, size), break the limits [N]; 0 where they hold."""
+        lower, upper = self.bounds(u.shape[1])
+        return np.maximum(0.0, np.maximum(lower - u, u - upper)).max(axis=1, initial=0.0)
+
+    def words(self) -> str:
+        """One line for a person."""
+        return "any force, without a limit"
+
+
+@dataclass(frozen=True)
+class FreeForce(Actuator):
+    """Any force, without a limit [N]."""
+
+
+@dataclass(frozen=True)
+class BoxForce(Actuator):
+    """A force limited along each axis: |F_i| <= limit_i.
+
+    Parameters
+    ----------
+    limit : float or sequence of float
+        Largest force [N], one number or one for each axis.
+    """
+
+    limit: float | tuple
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", limits("limit", self.limit, "N"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if isinstance(self.limit, tuple) and len(self.limit) != dimension:
+            raise ValueError(
+                f"BoxForce: limit has {len(self.limit)} entries but the problem has {dimension} dimensions; "
+                f"give one number or {dimension}"
+            )
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        limit = np.broadcast_to(np.asarray(self.limit, float), (dimension,)).copy()
+        return -limit, limit
+
+    def force_limit(self) -> float:
+        return float(np.max(self.limit))
+
+    def words(self) -> str:
+        return f"a force with each component within {self.limit} N"
+
+
+@dataclass(frozen=True)
+class BallForce(Actuator):
+    """A force of limited magnitude in any direction: |F| <= limit.
+
+    Parameters
+    ----------
+    limit : float
+        Largest force [N].
+    """
+
+    limit: float
+    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
+
+    def __post_init__(self) -> None:
+        value = limits("limit", self.limit, "N")
+        if isinstance(value, tuple):
+            raise ValueError(
+                f"BallForce: limit must be one number [N], the radius of the ball; got {self.limit!r}"
+            )
+        object.__setattr__(self, "limit", value)
+
+    def rows(self, u: Any) -> list[Row]:
+        return [Row("magnitude", ca.dot(u, u) / self.limit**2, -np.inf, 1.0)]
+
+    def force_limit(self) -> float:
+        return self.limit
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, np.linalg.norm(u, axis=1) - self.limit)
+
+    def words(self) -> str:
+        return f"a force in any direction of at most {self.limit:g} N"

@@ -1,0 +1,89 @@
+"""Gravity and springs: effects with a potential."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from dmoc.checks import number, vector
+from dmoc.effects.base import Conservative, need_dimension
+
+
+@dataclass(frozen=True)
+class UniformGravity(Conservative):
+    """The same acceleration everywhere: l = g . q.
+
+    Parameters
+    ----------
+    acceleration : sequence of float
+        g [m/s^2], one entry an axis, for example (0, 0, -9.81).
+    """
+
+    acceleration: tuple
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "acceleration", vector("acceleration", self.acceleration, "m/s^2"))
+
+    def check_dimension(self, dimension: int) -> None:
+        need_dimension(self, "acceleration", len(self.acceleration), dimension)
+
+    def lagrangian(self, t, q, v, m):
+        return ca.dot(ca.DM(self.acceleration), q)
+
+
+@dataclass(frozen=True)
+class PointGravity(Conservative):
+    """Attraction by a point or a sphere: l = mu / |q - center|.
+
+    Parameters
+    ----------
+    mu : float
+        Gravitational parameter [m^3/s^2].
+    center : sequence of float, optional
+        Where the attractor is [m]; the origin if not given.
+    """
+
+    mu: float
+    center: tuple | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
+        if self.center is not None:
+            object.__setattr__(self, "center", vector("center", self.center, "m"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.center is not None:
+            need_dimension(self, "center", len(self.center), dimension)
+
+    def lagrangian(self, t, q, v, m):
+        offset = q if self.center is None else q - ca.DM(self.center)
+        # sqrt and multiplication: a power of 3/2 in the derivative would dominate the step function
+        return self.mu / ca.sqrt(ca.dot(offset, offset))
+
+
+@dataclass(frozen=True)
+class Spring(Conservative):
+    """A linear spring to a fixed point: l = -(stiffness / m) |q - anchor|^2 / 2.
+
+    Parameters
+    ----------
+    stiffness : float
+        Force per length [N/m].
+    anchor : sequence of float
+        Where the spring is at rest [m].
+    """
+
+    stiffness: float
+    anchor: tuple
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stiffness", number("stiffness", self.stiffness, "N/m", nonnegative=True))
+        object.__setattr__(self, "anchor", vector("anchor", self.anchor, "m"))
+
+    def check_dimension(self, dimension: int) -> None:
+        need_dimension(self, "anchor", len(self.anchor), dimension)
+
+    def lagrangian(self, t, q, v, m):
+        offset = q - ca.DM(self.anchor)
+        return -0.5 * self.stiffness / m * ca.dot(offset, offset)

@@ -1,0 +1,189 @@
+"""The path to start from: coast arcs where a point mass attracts, a straight line elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.effects.frames import RotatingFrame
+from dmoc.effects.gravity import PointGravity
+from dmoc.lobatto import scheme
+from dmoc.mechanics import Dynamics
+from dmoc.mesh import Guess, node_fractions
+from dmoc.problem import TransferProblem
+
+
+def starting_guess(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
+) -> Guess:
+    """A guess on the mesh, from what is given, else from the problem's own, else from its physics.
+
+    Raises
+    ------
+    ValueError
+        If the guess has another dimension than the problem or holds a number that is not finite.
+    """
+    given = problem.guess if given is None else given
+    given = getattr(given, "path", given)
+    if isinstance(given, Guess):
+        if given.position.shape[1] != problem.dimension:
+            raise ValueError(
+                f"guess has {given.position.shape[1]} axes but the problem has {problem.dimension}"
+            )
+        return given.onto(mesh, order, hold)
+    fractions = node_fractions(mesh, scheme(order))
+    duration = guess_duration(problem)
+    if given is None:
+        position, ends = _default_path(problem, duration, fractions)
+    else:
+        position = _given_path(problem, given, duration, fractions)
+        ends = _end_states(problem, duration)[1::2]
+    if not np.isfinite(position).all():
+        node = int(np.argmin(np.isfinite(position).all(axis=1)))
+        raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
+    for end, place in ((problem.start, 0), (problem.goal, -1)):
+        known = ~np.isnan(end.fixed()[0])
+        position[place, known] = end.fixed()[0][known]
+    controls = (len(mesh) - 1 if hold else len(fractions), problem.actuator.size(problem.dimension))
+    mass = np.full(len(fractions), problem.mass)
+    return Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+
+
+def guess_duration(problem: TransferProblem) -> float:
+    """The duration, or a likely one within its bounds [s].
+
+    With a force limit: from rest to rest over the distance and the change of velocity at full
+    force, and a fifth more; otherwise the geometric mean of the bounds.
+    """
+    shortest, longest = problem.duration_bounds
+    if not problem.free_duration:
+        return shortest
+    limit = problem.actuator.force_limit()
+    middle = float(np.sqrt(shortest * longest))
+    if limit is None:
+        return middle
+    q0, v0, q1, v1 = _end_states(problem, middle)
+    acceleration = limit / problem.mass
+    needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
+    return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
+
+
+def _given_path(problem: TransferProblem, given: Any, duration: float, fractions: np.ndarray) -> np.ndarray:
+    times = problem.start_time + duration * fractions
+    if callable(given):
+        position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times])
+    else:
+        try:
+            known, values = (np.asarray(part, float) for part in given)
+            values = values.reshape(len(known), -1)
+            position = np.stack([np.interp(times, known, column) for column in values.T], axis=1)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                "guess must be a function of time [s], a pair (times, positions) or a former solution; "
+                f"got {type(given).__name__} ({error})"
+            ) from None
+    if position.shape != (len(fractions), problem.dimension):
+        raise ValueError(f"guess has {position.shape[1]} axes but the problem has {problem.dimension}")
+    return position
+
+
+def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
+    """Start position and velocity, goal position and velocity, with likely values for what is free."""
+    q0, v0 = (value.copy() for value in problem.start.estimate(problem.start_time))
+    q1, v1 = (value.copy() for value in problem.goal.estimate(problem.start_time + duration))
+    q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1), q0)
+    q1 = np.where(np.isnan(q1), q0, q1)
+    mean = (q1 - q0) / duration
+    return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
+
+
+def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
+    q0, v0, q1, v1 = _end_states(problem, duration)
+    attractors = [effect for effect in problem.effects if isinstance(effect, PointGravity)]
+    if not attractors:
+        return q0 + fractions[:, None] * (q1 - q0), (v0, v1)
+    forward = _coast(problem, 0.0, duration, q0, v0)
+    backward = _coast(problem, duration, 0.0, q1, v1)
+    sample = np.linspace(0.0, 1.0, max(2000, 8 * forward.t.size, 8 * backward.t.size))
+    arcs = [arc.sol(sample * duration)[: problem.dimension].T for arc in (forward, backward)]
+    turning = any(isinstance(effect, RotatingFrame) for effect in problem.effects)
+    if len(attractors) == 1 and not turning and problem.dimension > 1:
+        center = np.zeros(problem.dimension) if attractors[0].center is None else np.array(attractors[0].center)
+        states = ((q0 - center, v0), (q1 - center, v1))
+        path = center + _blend_around(sample, arcs[0] - center, arcs[1] - center, states)
+    else:
+        blend = _smooth(sample)[:, None]
+        path = (1 - blend) * arcs[0] + blend * arcs[1]
+    path = np.stack([np.interp(fractions, sample, column) for column in path.T], axis=1)
+    return _keep_clear(path, attractors, q0, q1), (v0, v1)
+
+
+def _coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: np.ndarray) -> Any:
+    from scipy.integrate import solve_ivp
+
+    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    n, still = problem.dimension, np.zeros(problem.dimension)
+
+    def rate(t: float, state: np.ndarray) -> np.ndarray:
+        push = dynamics.acceleration(problem.start_time + t, state[:n], state[n:], problem.mass, still)
+        return np.concatenate([state[n:], np.array(push).ravel()])
+
+    return solve_ivp(rate, (start, end), np.concatenate([q, v]), rtol=1e-6, atol=1e-9, dense_output=True)
+
+
+def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
+    """Blend two arcs around an attractor at the origin in radius, angle and height.
+
+    The number of revolutions is the mean of what the two arcs sweep in the whole duration: it comes
+    from the periods of the two ends and the duration, never from positions alone.
+    """
+    frame = _orbit_frame(states)
+    arcs = [np.pad(arc, ((0, 0), (0, 3 - arc.shape[1]))) @ frame for arc in (first, second)]
+    angles = [np.unwrap(np.arctan2(arc[:, 1], arc[:, 0])) for arc in arcs]
+    sweeps = [angle[-1] - angle[0] for angle in angles]
+    gap = angles[1][-1] - angles[0][0] - 0.5 * (sweeps[0] + sweeps[1])
+    angles[1] = angles[1] - 2 * np.pi * np.round(gap / (2 * np.pi))
+    blend = _smooth(sample)
+
+    def mix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return (1 - blend) * a + blend * b
+
+    radius = mix(*(np.hypot(arc[:, 0], arc[:, 1]) for arc in arcs))
+    angle, height = mix(*angles), mix(arcs[0][:, 2], arcs[1][:, 2])
+    path = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1) @ frame.T
+    return path[:, : first.shape[1]]
+
+
+def _orbit_frame(states) -> np.ndarray:
+    """Columns: two axes in the mean orbital plane and its normal."""
+    normal = np.zeros(3)
+    for q, v in states:
+        momentum = np.cross(np.pad(q, (0, 3 - len(q))), np.pad(v, (0, 3 - len(v))))
+        normal += momentum / (np.linalg.norm(momentum) or 1.0)
+    if len(states[0][0]) == 2 or np.linalg.norm(normal) < 1e-6:
+        normal = np.array([0.0, 0.0, 1.0])
+    normal /= np.linalg.norm(normal)
+    first = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[0]) > abs(normal[2]) else [0.0, -1.0, 0.0])
+    if np.linalg.norm(first) < 1e-6:
+        first = np.cross(normal, [1.0, 0.0, 0.0])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first), normal], axis=1)
+
+
+def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+    """Push nodes out of the neighbourhood of attractors, where no scheme can start."""
+    for attractor in attractors:
+        center = np.zeros(len(q0)) if attractor.center is None else np.array(attractor.center)
+        offset = path - center
+        distance = np.linalg.norm(offset, axis=1, keepdims=True)
+        least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))
+        sideways = np.roll(q1 - q0, 1) if len(q0) > 1 else np.ones(1)
+        offset = np.where(distance > 1e-9 * least, offset, sideways / (np.linalg.norm(sideways) or 1.0))
+        length = np.linalg.norm(offset, axis=1, keepdims=True)
+        path = center + offset * np.maximum(distance, least) / np.where(length > 0, length, 1.0)
+    return path
+
+
+def _smooth(x: np.ndarray) -> np.ndarray:
+    return x * x * (3 - 2 * x)

@@ -1,0 +1,76 @@
+"""Where every unknown and every row of an NLP stands, what it is called and how it is scaled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Group:
+    """Neighbouring unknowns or rows of one kind: `count` times the components in `labels`.
+
+    `kind` says what the index counts and how multipliers travel between meshes: "smooth" (nodes,
+    rows of the discrete Euler-Lagrange equations), "node", "control", "step" or "end" (counts nothing).
+    """
+
+    name: str
+    kind: str
+    labels: tuple[str, ...]
+    count: int
+    start: int
+    scale: float | np.ndarray = 1.0
+
+    @property
+    def indices(self) -> np.ndarray:
+        """Places in the NLP, shape (components, count)."""
+        size = len(self.labels)
+        return self.start + np.arange(size)[:, None] + size * np.arange(self.count)
+
+    @property
+    def stop(self) -> int:
+        return self.start + len(self.labels) * self.count
+
+    def of(self, vector: np.ndarray) -> np.ndarray:
+        """This group's part of a vector, shape (count, components)."""
+        return np.asarray(vector)[self.start : self.stop].reshape(self.count, len(self.labels))
+
+    def name_of(self, place: int) -> str:
+        """Such as `dynamics[17].y` or `goal.velocity.z`."""
+        index, component = divmod(place - self.start, len(self.labels))
+        label = self.labels[component]
+        if self.name == "position" and index in (0, self.count - 1):
+            return f"{'start' if index == 0 else 'goal'}.position.{label}"
+        return ".".join(filter(None, [self.name + ("" if self.kind == "end" else f"[{index}]"), label]))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The groups of unknowns or of rows, in order."""
+
+    groups: tuple[Group, ...] = ()
+
+    def add(self, name: str, kind: str, labels, count: int, scale: float | np.ndarray = 1.0) -> Layout:
+        return Layout((*self.groups, Group(name, kind, tuple(labels), count, self.size, scale)))
+
+    @property
+    def size(self) -> int:
+        return self.groups[-1].stop if self.groups else 0
+
+    def __contains__(self, name: str) -> bool:
+        return any(group.name == name for group in self.groups)
+
+    def __getitem__(self, name: str) -> Group:
+        return next(group for group in self.groups if group.name == name)
+
+    def name_of(self, place: int) -> str:
+        return next(group for group in self.groups if place < group.stop).name_of(place)
+
+    def scales(self) -> np.ndarray:
+        """Scale of every place; a group's scale is one number, or one for each of its indices."""
+        parts = [
+            np.repeat(np.broadcast_to(np.asarray(group.scale, float), (group.count,)), len(group.labels))
+            for group in self.groups
+        ]
+        return np.concatenate([*parts, np.empty(0)])

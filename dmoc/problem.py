@@ -1,0 +1,146 @@
+"""TransferProblem: the physics of one transfer, put together and checked when made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dmoc.actuators import Actuator, FreeForce
+from dmoc.boundary import Boundary
+from dmoc.checks import number
+from dmoc.constraints import Constraint
+from dmoc.effects.base import Effect
+from dmoc.objectives import Effort, Objective, Time
+
+
+@dataclass(frozen=True)
+class TransferProblem:
+    """Move a body from `start` to `goal` under `effects`, pushed by `actuator`, at the least `objective`.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the body at the start [kg].
+    start, goal : Boundary
+        Where the transfer starts and ends, for example `State(position, velocity)` in m and m/s.
+    duration : float or (float, float)
+        Time of the transfer [s]; a pair (shortest, longest) leaves it free between the two.
+    effects : sequence of Effect
+        What acts on the body. What is not listed costs nothing.
+    actuator : Actuator
+        What pushes it.
+    objective : Objective
+        What is minimised.
+    constraints : sequence of Constraint
+        What is forbidden on the way.
+    guess : callable, tuple of arrays or Solution, optional
+        Starting guess of the path: a function of the time [s] that gives the position [m], a pair
+        (times, positions) of shapes (count,) and (count, dimension), or a former solution.
+    start_time : float
+        Time at the start [s].
+    name, parameters
+        Provenance, set when the problem is loaded from a file.
+
+    Raises
+    ------
+    ValueError
+        If a number has no meaning or two parts do not fit together.
+    """
+
+    mass: float
+    start: Boundary
+    goal: Boundary
+    duration: float | tuple[float, float]
+    effects: tuple[Effect, ...] = ()
+    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+    objective: Objective = Effort()  # noqa: RUF009 - immutable
+    constraints: tuple[Constraint, ...] = ()
+    guess: Any = None
+    start_time: float = 0.0
+    name: str = field(default="problem", compare=False)
+    parameters: dict = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", number("mass", self.mass, "kg", positive=True))
+        object.__setattr__(self, "duration", _duration(self.duration))
+        object.__setattr__(self, "start_time", number("start_time", self.start_time, "s"))
+        object.__setattr__(self, "effects", _parts("effects", self.effects, Effect))
+        object.__setattr__(self, "constraints", _parts("constraints", self.constraints, Constraint))
+        for name, kind in (
+            ("start", Boundary),
+            ("goal", Boundary),
+            ("actuator", Actuator),
+            ("objective", Objective),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
+        if self.start.dimension != self.goal.dimension:
+            raise ValueError(
+                f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
+            )
+        parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator)
+        for part in parts:
+            part.check_dimension(self.dimension)
+        self._check_least_time()
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes, 1 to 3."""
+        return self.start.dimension
+
+    @property
+    def adjustable_parts(self) -> tuple:
+        """Parts with numbers that may change from one solve to the next without a rebuild."""
+        return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+
+    @property
+    def free_duration(self) -> bool:
+        """Whether the duration is found by the optimisation."""
+        return isinstance(self.duration, tuple)
+
+    @property
+    def duration_bounds(self) -> tuple[float, float]:
+        """Shortest and longest duration [s]; equal if it is fixed."""
+        return self.duration if isinstance(self.duration, tuple) else (self.duration, self.duration)
+
+    def _check_least_time(self) -> None:
+        if not isinstance(self.objective, Time):
+            return
+        if not self.free_duration:
+            given = self.duration_bounds[0]
+            raise ValueError(
+                f"least time needs a free duration; got {given:g} s: give (shortest, longest), "
+                f"for example ({0.1 * given:g}, {10 * given:g})"
+            )
+        if self.actuator.force_limit() is None:
+            raise ValueError(
+                "least time without a force limit has no optimum (the duration goes to 0 s); "
+                "use BoxForce(limit) or BallForce(limit)"
+            )
+
+
+def _duration(value: Any) -> float | tuple[float, float]:
+    if np.ndim(value) == 0:
+        return number("duration", value, "s", positive=True)
+    if len(value) != 2:
+        raise ValueError(f"duration must be one number or (shortest, longest) [s]; got {value!r}")
+    shortest = number("duration's shortest", value[0], "s", positive=True)
+    longest = number("duration's longest", value[1], "s", positive=True)
+    if shortest >= longest:
+        raise ValueError(
+            f"duration's shortest must be less than its longest; got {shortest:g} and {longest:g} s"
+        )
+    return shortest, longest
+
+
+def _parts(name: str, value: Any, kind: type) -> tuple:
+    parts = (value,) if isinstance(value, kind) else value
+    if isinstance(parts, str) or not isinstance(parts, Sequence):
+        raise ValueError(f"{name} must be a sequence of dmoc.{kind.__name__}; got {value!r}")
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ValueError(f"{name} must hold only dmoc.{kind.__name__} objects; got {part!r}")
+    return tuple(parts)

@@ -1,0 +1,37 @@
+"""A constraint row as the parts of a problem state it, and parts whose numbers may change between solves."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+
+class Row(NamedTuple):
+    """lower <= expression <= upper, dimensionless and of order 1."""
+
+    name: str
+    expression: Any
+    lower: float
+    upper: float
+
+
+def with_symbols(part: Any, name: str) -> tuple[Any, list]:
+    """A twin of a part whose adjustable fields are CasADi symbols, and those symbols."""
+    twin, symbols = copy.copy(part), []
+    for field, value in zip(part.adjustable, _values(part), strict=True):
+        symbol = ca.SX.sym(f"{name}.{field}", value.size)
+        object.__setattr__(twin, field, symbol)
+        symbols.append(symbol)
+    return twin, symbols
+
+
+def values_of(part: Any) -> np.ndarray:
+    """The numbers that stand for the symbols of `with_symbols`, in the same order."""
+    return np.concatenate([*_values(part), np.empty(0)])
+
+
+def _values(part: Any) -> list[np.ndarray]:
+    return [np.atleast_1d(np.asarray(getattr(part, field), float)) for field in part.adjustable]
