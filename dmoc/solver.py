@@ -28,7 +28,7 @@ ADVICE = {
     "or try another guess (this is a local verdict)",
     "iteration limit": "raise options={'ipopt.max_iter': ...}, use fewer steps first, or give a better guess",
     "invalid number": "the guess or an iterate met an undefined value (a distance of 0, say): change the guess",
-    "restoration failed": "look for contradictory or repeated conditions, then try another guess or wider limits",
+    "restoration failed": "look for contradictory or repeated conditions, then try another guess",
     "diverging": "the objective has no lower bound here; limit the force or the duration",
     "stopped": "interrupted; the best iterate is kept",
     "failed": "try another guess, another number of steps, or hold=True",
