@@ -52,6 +52,13 @@ class Scheme:
         """Matrix (len(fractions), s+1) that differentiates the interpolant at fractions of the step."""
         return _vander_derivative(fractions, self.degree) @ _inverse_vandermonde(self.points)
 
+    def hermite_slopes(self) -> np.ndarray:
+        """Matrix (s+1, s+3): slopes at the nodes of the polynomial with given node values and end slopes."""
+        powers = np.arange(self.degree + 3)
+        values = self.points[:, None] ** powers
+        slopes = powers * self.points[:, None] ** np.maximum(powers - 1, 0)
+        return slopes @ np.linalg.inv(np.vstack([values, slopes[[0, -1]]]))
+
     def gauss_points(self) -> np.ndarray:
         """The s Gauss points of the step, where the velocity of the interpolant is most accurate."""
         return 0.5 * (legendre.leggauss(self.degree)[0] + 1)

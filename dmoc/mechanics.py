@@ -82,7 +82,7 @@ class Dynamics:
         dldq, dldv, push = self.point(t, q, v, m)
         change = ca.jacobian(dldv, q) @ v + ca.jacobian(dldv, t)
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
-        return ca.Function("acceleration", [t, q, v, m, f], [rate])
+        return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
 
     @cached_property
     def depends_on_velocity(self) -> bool:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
 from dmoc.lobatto import scheme
-from dmoc.mechanics import Dynamics, step_momenta
-from dmoc.mesh import Guess, step_nodes
+from dmoc.mechanics import Dynamics, step_map, step_momenta
+from dmoc.mesh import Guess, node_fractions, step_nodes, uniform_mesh
+from dmoc.problem import TransferProblem
 
 
 def end_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -16,25 +22,29 @@ def end_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[np.
     The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
     end what arrives there.
     """
-    rule, n = scheme(path.order), dynamics.dimension
-    origin = path.position[0]
-    legendre = legendre_function(dynamics, path.order, path.hold)
-    steps = len(path.mesh) - 1
-    at = step_nodes(steps, rule)
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    momenta = legendre_momenta(dynamics, path, start_time)
+    p = np.concatenate([-momenta[0], momenta[-1][-1:]])
     times = start_time + path.duration * path.mesh
-    positions = np.concatenate([(path.position[at[j]] - origin).T for j in range(at.shape[0])])
-    control = (
-        path.control.T if path.hold else np.concatenate([path.control[at[j]].T for j in range(at.shape[0])])
-    )
-    masses = path.mass[at]
-    momenta = legendre(
-        positions, masses, control, times[None, :-1], path.duration * np.diff(path.mesh)[None], origin
-    )
-    leaving, arriving = -np.array(momenta[0]), np.array(momenta[-1])
-    p = np.concatenate([leaving.T, arriving[:, -1:].T])
-    ends = path.position[:: rule.degree]
-    v = dynamics.velocity(times[None], ends.T, p.T, path.mass[:: rule.degree][None])
+    v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
     return p, np.array(v).T.reshape(-1, n)
+
+
+def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    at = step_nodes(steps, rule)
+    origin = path.position[0]
+
+    def stacked(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values[at[j]].T for j in range(rule.degree + 1)])
+
+    control = path.control.T if path.hold else stacked(path.control)
+    times = (start_time + path.duration * path.mesh[:-1])[None]
+    function = legendre_function(dynamics, path.order, path.hold)
+    lengths = path.duration * np.diff(path.mesh)[None]
+    momenta = function(stacked(path.position - origin), path.mass[at], control, times, lengths, origin)
+    return np.array([np.array(momentum).T.reshape(steps, n) for momentum in momenta])
 
 
 def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
@@ -57,3 +67,201 @@ def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function
 
     momenta = step_momenta(rule, point, t, h, ca.vertsplit(q, n), ca.vertsplit(m), push)
     return ca.Function("legendre", [q, m, u, t, h, origin], momenta)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A path found by forward integration, at the step ends; SI units, one row an end.
+
+    Attributes
+    ----------
+    time : array, shape (steps+1,)
+        [s].
+    position, velocity : arrays, shape (steps+1, axes)
+        [m], [m/s].
+    momentum : array, shape (steps+1, axes)
+        dl/dv, per unit mass [m/s].
+    mass : array, shape (steps+1,)
+        [kg].
+    energy : array, shape (steps+1,)
+        v . dl/dv - l, per unit mass [J/kg].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    momentum: np.ndarray
+    mass: np.ndarray
+    energy: np.ndarray
+
+
+def simulate(
+    problem: TransferProblem,
+    controls: Any = None,
+    steps: int | None = None,
+    order: int = 2,
+    hold: bool = False,
+    duration: float | None = None,
+) -> Trajectory:
+    """Integrate a scene forward from its start with the variational scheme.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+        Its start must be a state without free entries.
+    controls : Solution or array, optional
+        A solution, whose mesh, order and controls are then used, or controls of shape
+        (steps*s+1, size), with hold (steps, size); nothing for a coast.
+    steps, order, hold
+        As in `solve`, if `controls` is not a solution.
+    duration : float, optional
+        [s], if it is not the problem's.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ValueError
+        If the start is not fixed, or the controls do not fit the mesh.
+    """
+    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    position, velocity = problem.start.fixed()
+    if np.isnan(position).any() or np.isnan(velocity).any():
+        raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
+    path = getattr(controls, "path", None)
+    if path is None:
+        mesh = uniform_mesh(400 if steps is None else int(steps))
+        nodes = len(node_fractions(mesh, scheme(order)))
+        shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
+        given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+        if given.shape != shape:
+            raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
+        longest = problem.duration_bounds[1] if duration is None else duration
+        mass = np.full(nodes, problem.mass)
+        path = Guess(
+            mesh, order, hold, float(longest), np.tile(position, (nodes, 1)), given, mass, velocity, velocity
+        )
+    time = problem.start_time + path.duration * path.mesh
+    mass = path.mass[:: scheme(path.order).degree]
+    momentum = dynamics.point(time[0], position, velocity, mass[0])[1]
+    q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel())
+    v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
+    energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
+    return Trajectory(time, q, v, p, mass, energy)
+
+
+def rollout(
+    dynamics: Dynamics, path: Guess, start_time: float, position: np.ndarray, momentum: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] and momenta per mass [m/s] at the step ends, of shape (steps+1, axes), from the start.
+
+    Only the mesh, masses and controls of `path` are used, and its first position as the origin.
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    given, after, inputs = _advance(dynamics, path, start_time)
+    march = ca.Function("march", given, [after]).mapaccum(steps)
+    start = np.concatenate([position - path.position[0], momentum])
+    states = np.concatenate([start[:, None], np.array(march(start, *inputs))], axis=1).T
+    return states[:, :n] + path.position[0], states[:, n:]
+
+
+def step_matrices(dynamics: Dynamics, path: Guess, start_time: float, momentum: np.ndarray) -> np.ndarray:
+    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
+
+    `momentum` are the momenta per mass at the step ends, shape (steps+1, axes) [m/s].
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    given, after, inputs = _advance(dynamics, path, start_time)
+    tangent = ca.Function("tangent", given, [ca.densify(ca.jacobian(after, given[0]))])
+    ends = path.position[:: scheme(path.order).degree] - path.position[0]
+    states = np.concatenate([ends[:-1], momentum[:-1]], axis=1).T
+    matrices = np.array(tangent.map(steps)(states, *inputs))
+    return matrices.reshape(2 * n, steps, 2 * n).transpose(1, 0, 2)
+
+
+def _advance(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[list, ca.MX, list]:
+    """Symbols of one step (its state first), the state after it, the inputs of all steps side by side."""
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    at = step_nodes(steps, rule)
+    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
+    times = start_time + path.duration * path.mesh[:-1]
+    inputs = [path.mass[at], control.T, times[None], path.duration * np.diff(path.mesh)[None]]
+    given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
+    state = ca.MX.sym("state", 2 * n)
+    increments = step_map(dynamics, rule, path.hold)(state[:n], state[n:], *given, path.position[0])
+    return [state, *given], state + ca.vertcat(*increments[:2]), inputs
+
+
+def reference(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position [m] and velocity [m/s] at the goal by SciPy's DOP853, from the start with the path's controls.
+
+    The control is the polynomial through each step's Lobatto nodes, with hold the held value; the
+    integrator restarts where it jumps.
+    """
+    from scipy.integrate import solve_ivp
+
+    n, ends = dynamics.dimension, path.duration * path.mesh
+    motion = _Motion(dynamics, path, start_time)
+    force = force_of(dynamics, path.control)
+    if path.hold:
+        arcs: list = [(ends[k], ends[k + 1], lambda t, k=k: force[k]) for k in range(len(ends) - 1)]
+    else:
+        arcs = [(ends[0], ends[-1], _interpolant(force, ends, path.order))]
+    extent = np.ptp(path.position, axis=0).max() or 1.0
+    scale = np.repeat([extent, max(extent / path.duration, np.abs(velocity).max())], n)
+    # no long strides: an arc of coast must not step over a short thrust
+    settings = {"rtol": 1e-11, "atol": 1e-12 * scale, "max_step": path.duration / 40}
+    state = np.concatenate([path.position[0], velocity])
+    for begin, end, control in arcs:
+        run = solve_ivp(motion, (begin, end), state, "DOP853", args=(control,), **settings)
+        state = run.y[:, -1]
+    return state[:n], state[n:]
+
+
+def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
+    """Force [N] of controls, one row each."""
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
+    return np.array(force(control.T)).T.reshape(len(control), dynamics.dimension)
+
+
+def _interpolant(force: np.ndarray, ends: np.ndarray, order: int) -> Callable[[float], np.ndarray]:
+    """The force as a function of time: one polynomial a step, in powers of the fraction of the step."""
+    rule = scheme(order)
+    nodes = force[step_nodes(len(ends) - 1, rule)]
+    to_powers = np.linalg.inv(np.vander(rule.points, increasing=True))
+    coefficients = np.einsum("pj,jkn->kpn", to_powers, nodes)
+    exponents = np.arange(rule.degree + 1)
+    ends_list, last = ends.tolist(), len(ends) - 2
+
+    def control(t: float) -> np.ndarray:
+        k = min(max(bisect_right(ends_list, t) - 1, 0), last)
+        return ((t - ends_list[k]) / (ends_list[k + 1] - ends_list[k])) ** exponents @ coefficients[k]
+
+    return control
+
+
+class _Motion:
+    """d(q, v)/dt as a function of time, state and a control function, through CasADi's buffers (no copies)."""
+
+    def __init__(self, dynamics: Dynamics, path: Guess, start_time: float):
+        n = self.axes = dynamics.dimension
+        self.start_time, self.rate = start_time, np.zeros(n)
+        # the buffer holds bare addresses: everything it points to lives as long as this object
+        self.arguments = np.zeros(1), np.zeros(n), np.zeros(n), path.mass[:1].copy(), np.zeros(n)
+        self.function = dynamics.acceleration
+        self.buffer, self.evaluate = self.function.buffer()
+        for i, argument in enumerate(self.arguments):
+            self.buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type]
+        self.buffer.set_res(0, memoryview(self.rate))  # type: ignore[arg-type]
+
+    def __call__(self, t: float, state: np.ndarray, control: Callable[[float], np.ndarray]) -> np.ndarray:
+        time, position, velocity, _, push = self.arguments
+        time[0], push[:] = self.start_time + t, control(t)
+        position[:], velocity[:] = state[: self.axes], state[self.axes :]
+        self.evaluate()
+        return np.concatenate([velocity, self.rate])

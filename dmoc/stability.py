@@ -1,0 +1,96 @@
+"""Growth of the one-step matrix against that of the exact flow, along a path and before a solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from dmoc.lobatto import scheme
+from dmoc.mechanics import Dynamics, state_symbols
+from dmoc.mesh import Guess
+from dmoc.simulate import step_matrices
+
+# Frozen along a path the two differ by what the path changes within a step; where the linearisation is
+# constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.
+GROWTH, GROWTH_CONSTANT = 1.05, 1.001
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Largest spectral radius of a one-step matrix over the exact flow's, what is allowed, and h omega."""
+
+    value: float
+    limit: float
+    frequency: float
+    constant: bool
+
+    @property
+    def ok(self) -> bool:
+        return self.value <= self.limit
+
+
+def growth_along(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray, matrices: np.ndarray
+) -> Growth:
+    """Growth of the steps of a path, from its `step_matrices` and velocities at the step ends [m/s]."""
+    flow, constant = flow_matrices(dynamics, path, start_time, velocity)
+    h = path.duration * np.diff(path.mesh)
+    rates = np.linalg.eigvals(flow)
+    fastest = rates.real.max(axis=1)
+    exact = np.exp(h * np.maximum(fastest[:-1], fastest[1:]))
+    ours = np.abs(np.linalg.eigvals(matrices)).max(axis=1) if np.isfinite(matrices).all() else np.inf
+    value = float(np.nan_to_num(np.max(ours / exact), nan=np.inf))
+    frequency = float((h * np.abs(rates).max(axis=1)[:-1]).max())
+    return Growth(value, GROWTH_CONSTANT if constant else GROWTH, frequency, constant)
+
+
+def flow_matrices(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+) -> tuple[np.ndarray, bool]:
+    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    t, q, v, m = state_symbols(n)
+    rate = dynamics.acceleration(t, q, v, m, ca.DM.zeros(n))
+    jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
+    function = ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)])
+    times = start_time + path.duration * path.mesh
+    stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
+    constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v))
+    return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
+
+
+def refuse_unstable(dynamics: Dynamics, guess: Guess, start_time: float, shortest: float) -> None:
+    """Refuse a mesh beyond the scheme's stability limit where that is known before the solve.
+
+    It is known where the linearisation does not depend on the state; elsewhere the check of the
+    solution tells.
+
+    Raises
+    ------
+    ValueError
+        With h omega, the growth per step and the number of steps that is enough.
+    """
+    longest = np.diff(guess.mesh).max()
+    order, degree = guess.order, guess.order // 2
+    nodes = np.linspace(0, len(guess.position) - 1, 2 * degree + 1).round().astype(int)
+    probe = replace(
+        guess,
+        mesh=np.array([0.0, 0.5, 1.0]),
+        duration=2 * longest * shortest,
+        position=guess.position[nodes],
+        mass=guess.mass[nodes],
+        control=np.zeros((2 if guess.hold else len(nodes), guess.control.shape[1])),
+    )
+    velocity = np.zeros((3, dynamics.dimension))
+    if not flow_matrices(dynamics, probe, start_time, velocity)[1]:
+        return
+    matrices = step_matrices(dynamics, probe, start_time, velocity)
+    growth = growth_along(dynamics, probe, start_time, velocity, matrices)
+    if not growth.ok:
+        steps = len(guess.mesh) - 1
+        raise ValueError(
+            f"{steps} steps of order {order} are unstable for this scene: h omega = {growth.frequency:.3g}, "
+            f"errors grow {growth.value:.3g} times a step; use {int(steps * growth.frequency) + 1} steps"
+        )
