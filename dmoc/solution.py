@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import os
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,62 @@ class Level:
 
 
 @dataclass(frozen=True)
+class Provenance:
+    """Where a solution comes from: what is to be known of it even where its problem is not at hand.
+
+    Attributes
+    ----------
+    problem_name : str
+    parameters : dict
+        What the problem was made with.
+    start_time : float
+        Time at the start [s].
+    objective_unit : str
+    control_labels, control_units : tuple of str
+        One entry a control.
+    options : dict
+        Options given to the solver.
+    source_hash : str
+        Hash of the problem's file, given by who saves it.
+    versions : dict
+        Of dmoc, casadi, numpy and python when it was saved; empty before.
+    created : str
+        When it was saved, in UTC; empty before.
+    """
+
+    problem_name: str = "problem"
+    parameters: dict[str, Any] = field(default_factory=dict)
+    start_time: float = 0.0
+    objective_unit: str = ""
+    control_labels: tuple[str, ...] = ()
+    control_units: tuple[str, ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    source_hash: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    created: str = ""
+
+    @classmethod
+    def of(cls, problem: TransferProblem, options: dict[str, Any] | None = None) -> Provenance:
+        """What there is to be known of a problem and of the options of its solver."""
+        return cls(
+            problem.name,
+            problem.parameters,
+            problem.start_time,
+            problem.objective.unit,
+            tuple(problem.actuator.labels(problem.dimension)),
+            tuple(problem.actuator.units(problem.dimension)),
+            options or {},
+        )
+
+
+@dataclass(frozen=True)
 class Solution:
     """The answer to a transfer problem on the last mesh, whether it succeeded or not.
 
     Attributes
     ----------
+    problem : TransferProblem or None
+        None after `load`: a file holds numbers, not the problem; see `attach`.
     path : Guess
         Positions [m], controls, masses [kg], boundary velocities [m/s] and multipliers on the mesh.
     time : array, shape (nodes,)
@@ -50,9 +102,12 @@ class Solution:
         The meshes on the way, coarse to fine.
     worst : tuple of (str, float)
         Names of the worst scaled constraint violations of a failed solve, with their sizes.
+    details : dict
+        What else who saves it wants to keep; plain values only.
+    provenance : Provenance
     """
 
-    problem: TransferProblem
+    problem: TransferProblem | None
     path: Guess
     velocity: np.ndarray
     momentum: np.ndarray
@@ -65,6 +120,7 @@ class Solution:
     stationarity: float
     worst: tuple[tuple[str, float], ...] = ()
     details: dict[str, Any] = field(default_factory=dict, compare=False)
+    provenance: Provenance = field(kw_only=True)
 
     @property
     def order(self) -> int:
@@ -79,18 +135,23 @@ class Solution:
         return len(self.path.mesh) - 1
 
     @property
+    def dimension(self) -> int:
+        """Number of axes, 1 to 3."""
+        return self.path.position.shape[1]
+
+    @property
     def duration(self) -> float:
         """Duration [s]."""
         return self.path.duration
 
     @property
     def time(self) -> np.ndarray:
-        return self.problem.start_time + self.duration * self.path.fractions
+        return self.provenance.start_time + self.duration * self.path.fractions
 
     @property
     def end_times(self) -> np.ndarray:
         """Times of the step ends [s], shape (steps+1,)."""
-        return self.problem.start_time + self.duration * self.path.mesh
+        return self.provenance.start_time + self.duration * self.path.mesh
 
     @property
     def position(self) -> np.ndarray:
@@ -132,3 +193,81 @@ class Solution:
         if not self.success:
             raise SolveError(f"{self.status}: {self.message}")
         return self
+
+    def require_problem(self) -> TransferProblem:
+        """The problem.
+
+        Raises
+        ------
+        ValueError
+            If the solution was loaded from a file and no problem has been attached since.
+        """
+        if self.problem is None:
+            name = self.provenance.problem_name
+            raise ValueError(
+                f"this solution was loaded from a file and does not hold its problem {name!r}; "
+                "use solution.attach(problem) first"
+            )
+        return self.problem
+
+    def attach(self, problem: TransferProblem) -> Solution:
+        """A copy that holds its problem again, after `load`.
+
+        Raises
+        ------
+        ValueError
+            If the problem has another dimension, number of controls or start time than the solution.
+        """
+        facts = (
+            ("dimension", self.dimension, problem.dimension, ""),
+            ("number of controls", self.path.control.shape[1], problem.actuator.size(problem.dimension), ""),
+            ("start time", self.provenance.start_time, problem.start_time, " s"),
+        )
+        for name, here, there, unit in facts:
+            if here != there:
+                raise ValueError(
+                    f"problem {problem.name!r} does not fit this solution of {self.provenance.problem_name!r}: "
+                    f"its {name} is {there:g}{unit}, the solution's {here:g}{unit}; "
+                    "attach the problem that was solved"
+                )
+        return replace(self, problem=problem)
+
+    def save(self, path: str | os.PathLike, **provenance: Any) -> None:
+        """Write the solution to a netCDF-4 file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            Where to; an existing file is replaced.
+        provenance
+            What only the caller knows, by the names of `Provenance` (`source_hash`, `parameters`,
+            `problem_name`, ...); other names are kept in `details`.
+
+        Raises
+        ------
+        ValueError
+            If the folder does not exist.
+        """
+        from dmoc.results import write
+
+        known = {f.name for f in fields(Provenance)}
+        facts = {name: value for name, value in provenance.items() if name in known}
+        others = {name: value for name, value in provenance.items() if name not in known}
+        kept = replace(self.provenance, **facts)
+        write(replace(self, provenance=kept, details=self.details | others), path)
+
+
+def load(path: str | os.PathLike) -> Solution:
+    """The solution in a file that `Solution.save` wrote. Nothing in the file is ever run.
+
+    The problem is not in the file: `load(path).attach(problem)` gives it back. A loaded solution is
+    as good a guess as the original: `solve(problem, guess=load(path))`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, or it is damaged, foreign or from a newer dmoc.
+    """
+    from dmoc.results import read
+
+    return read(path)

@@ -15,7 +15,7 @@ from dmoc.lobatto import scheme
 from dmoc.mesh import Guess, node_weights, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.simulate import end_momenta
-from dmoc.solution import Level, Solution
+from dmoc.solution import Level, Provenance, Solution
 from dmoc.transcription import NLP, check_mesh, transcribe_onto, units_of
 
 DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
@@ -127,7 +127,7 @@ def solve(
         if answer.status != "solved":
             break
         known = path_of(nlp, problem, answer)
-    return solution_of(nlp, problem, answer, tuple(levels))
+    return solution_of(nlp, problem, answer, tuple(levels), options)
 
 
 def _ladder(problem: TransferProblem, final: np.ndarray, order: int, guess: Guess) -> list[np.ndarray]:
@@ -234,7 +234,13 @@ def _multiplier_groups(nlp: NLP, lam_x: np.ndarray, lam_g: np.ndarray):
             )
 
 
-def solution_of(nlp: NLP, problem: TransferProblem, answer: Answer, ladder: tuple[Level, ...]) -> Solution:
+def solution_of(
+    nlp: NLP,
+    problem: TransferProblem,
+    answer: Answer,
+    ladder: tuple[Level, ...],
+    options: dict[str, Any] | None = None,
+) -> Solution:
     """A Solution from what Ipopt gave on the last mesh."""
     path = path_of(nlp, problem, answer)
     n = problem.dimension
@@ -255,6 +261,7 @@ def solution_of(nlp: NLP, problem: TransferProblem, answer: Answer, ladder: tupl
         ladder,
         _stationarity(nlp, problem, answer),
         () if success else worst_rows(nlp, problem, answer.x, answer.g),
+        provenance=Provenance.of(problem, options),
     )
 
 

@@ -1,0 +1,37 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike) -> Iterator[Path]:
+    """A temporary file beside `path`, which takes its name once the block has ended without an error.
+
+    The temporary file keeps the suffix, since writers choose their format by it. After an error it
+    is gone and a former file of that name is as it was.
+
+    Raises
+    ------
+    ValueError
+        If the folder does not exist, or the path is itself a folder.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
+    if target.is_dir():
+        raise ValueError(f"cannot write {target}: it is a folder; add a file name")
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        yield temporary
+        with open(temporary, "rb+") as written:
+            # the name must not reach the disk before the contents
+            os.fsync(written.fileno())
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
