@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.guess import starting_guess
+from dmoc.ipopt import Answer, Progress, make_solver, path_of, run, scaled_multipliers, worst_rows
 from dmoc.lobatto import scheme
-from dmoc.mesh import Guess, node_weights, uniform_mesh
+from dmoc.mechanics import Dynamics
+from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.simulate import end_momenta
 from dmoc.solution import Level, Provenance, Solution
+from dmoc.stability import flow_matrices, refuse_unstable
 from dmoc.transcription import NLP, check_mesh, transcribe_onto, units_of
 
 DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
@@ -33,34 +35,6 @@ ADVICE = {
     "stopped": "interrupted; the best iterate is kept",
     "failed": "try another guess, another number of steps, or hold=True",
 }
-STATUS = {
-    "Solve_Succeeded": "solved",
-    "Solved_To_Acceptable_Level": "solved",
-    "Infeasible_Problem_Detected": "infeasible",
-    "Maximum_Iterations_Exceeded": "iteration limit",
-    "Maximum_CpuTime_Exceeded": "iteration limit",
-    "Maximum_WallTime_Exceeded": "iteration limit",
-    "Invalid_Number_Detected": "invalid number",
-    "Restoration_Failed": "restoration failed",
-    "Diverging_Iterates": "diverging",
-    "User_Requested_Stop": "stopped",
-}
-
-Progress = Callable[[int, int, int, float, str, float], bool | None]
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What one run of Ipopt on one mesh gave, scaled."""
-
-    x: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
-    g: np.ndarray
-    objective: float
-    status: str
-    iterations: int
-    seconds: float
 
 
 def solve(
@@ -108,130 +82,78 @@ def solve(
     if mesh is None and steps is None:
         steps = DEFAULT_STEPS[order]
     final = check_mesh(steps, mesh)
-    known = starting_guess(problem, final, order, hold, guess)
-    meshes = [final] if known.multipliers else _ladder(problem, final, order, known)
-    if len(meshes) > 1:
-        known = starting_guess(problem, meshes[0], order, hold, guess)
-    levels: list[Level] = []
+    first = starting_guess(problem, final, order, hold, guess)
+    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    refuse_unstable(dynamics, first, problem.start_time, problem.duration_bounds[0])
+    meshes = [final] if first.multipliers else _ladder(dynamics, problem, first)
+    climb = _Climb(problem, options, progress)
+    known = first
     for ends in meshes:
-        begun = time.perf_counter()
-        known = known.onto(ends, order, hold)
-        nlp = transcribe_onto(problem, known, units_of(problem, known))
-        solver = make_solver(nlp, options, warm=bool(known.multipliers), progress=progress)
-        built = time.perf_counter() - begun
-        answer = run(solver, nlp, problem, known)
-        objective = answer.objective * nlp.units.cost
-        levels.append(
-            Level(order, len(ends) - 1, answer.iterations, objective, built, answer.seconds, answer.status)
-        )
-        if answer.status != "solved":
+        solved = climb.solve_on(known.onto(ends, order, hold))
+        if not solved and not first.multipliers:
+            # a coarse mesh may have no path where a finer one does: go on from the first guess
+            known = replace(first.onto(ends, order, hold), duration=climb.another_duration(first.duration))
+            solved = known.duration != first.duration and climb.solve_on(known)
+        known = climb.path if solved else first
+        if climb.answer.status == "stopped":
             break
-        known = path_of(nlp, problem, answer)
-    return solution_of(nlp, problem, answer, tuple(levels), options)
+    return solution_of(climb.nlp, problem, climb.answer, tuple(climb.levels), options)
 
 
-def _ladder(problem: TransferProblem, final: np.ndarray, order: int, guess: Guess) -> list[np.ndarray]:
-    """Meshes from coarse to the final one, each about four times finer than the one before."""
-    least = max(COARSEST_NODES // (order // 2), 2)
+class _Climb:
+    """The way up the ladder: the last NLP, its answer, and every level so far."""
+
+    def __init__(self, problem: TransferProblem, options: dict[str, Any] | None, progress: Progress | None):
+        self.problem, self.options, self.progress = problem, options, progress
+        self.levels: list[Level] = []
+        self.nlp: NLP
+        self.answer: Answer
+
+    @property
+    def path(self) -> Guess:
+        return path_of(self.nlp, self.problem, self.answer)
+
+    def solve_on(self, guess: Guess) -> bool:
+        """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
+        if self._attempt(guess):
+            return True
+        return bool(guess.multipliers) and self._attempt(replace(guess, multipliers={}))
+
+    def _attempt(self, guess: Guess) -> bool:
+        begun = time.perf_counter()
+        self.nlp = transcribe_onto(self.problem, guess, units_of(self.problem, guess))
+        solver = make_solver(self.nlp, self.options, bool(guess.multipliers), self.progress)
+        built = time.perf_counter() - begun
+        answer = self.answer = run(solver, self.nlp, self.problem, guess)
+        objective = answer.objective * self.nlp.units.cost
+        steps = len(guess.mesh) - 1
+        self.levels.append(
+            Level(guess.order, steps, answer.iterations, objective, built, answer.seconds, answer.status)
+        )
+        return answer.status in ("solved", "stopped")
+
+    def another_duration(self, tried: float) -> float:
+        """A free duration to start from where `tried` led nowhere: the longest, within ten times of it."""
+        return float(min(self.problem.duration_bounds[1], 10 * tried))
+
+
+def _ladder(dynamics: Dynamics, problem: TransferProblem, guess: Guess) -> list[np.ndarray]:
+    """Meshes from coarse to the final one, each about four times finer than the one before.
+
+    The coarsest has 100 nodes or as many as keep h omega below 1 on the guess: a mesh that cannot
+    follow the motion has optima of its own.
+    """
+    final, degree = guess.mesh, guess.order // 2
+    sample = guess.onto(uniform_mesh(min(100, len(final) - 1)), 2, guess.hold)
+    slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
+    rates = np.linalg.eigvals(flow_matrices(dynamics, sample, problem.start_time, slopes)[0])
+    least = max(COARSEST_NODES // degree, 2, int(guess.duration * np.abs(rates).max()))
     counts = [len(final) - 1]
     while counts[-1] > 2 * least:
         counts.append(max(least, -(-counts[-1] // FINER)))
     places = np.linspace(0.0, 1.0, len(final))
-    return [
-        final if n == len(final) - 1 else np.interp(uniform_mesh(n), places, final) for n in reversed(counts)
-    ]
-
-
-def make_solver(
-    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, progress: Progress | None = None
-) -> ca.Function:
-    """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
-    parts = nlp.assembly
-    floor = 4e-15 * len(nlp.mesh)
-    tolerance = max(min(1e-10, 1e-8 / len(nlp.mesh)), floor)
-    settings: dict[str, Any] = {
-        "jac_g": parts.jacobian,
-        "hess_lag": parts.hessian,
-        "grad_f": parts.gradient,
-        "no_nlp_grad": True,
-        "calc_lam_p": False,
-        "print_time": False,
-        "error_on_fail": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.linear_solver": "mumps",
-        "ipopt.nlp_scaling_method": "none",
-        "ipopt.bound_relax_factor": 0.0,
-        "ipopt.tol": tolerance,
-        "ipopt.constr_viol_tol": 1e-6,
-        "ipopt.acceptable_iter": 0,
-        "ipopt.max_iter": 1000,
-    }
-    if warm:
-        settings |= {
-            "ipopt.warm_start_init_point": "yes",
-            "ipopt.mu_init": 1e-6,
-            "ipopt.warm_start_bound_push": 1e-8,
-            "ipopt.warm_start_bound_frac": 1e-8,
-            "ipopt.warm_start_slack_bound_push": 1e-8,
-            "ipopt.warm_start_slack_bound_frac": 1e-8,
-            "ipopt.warm_start_mult_bound_push": 1e-8,
-        }
-    if progress is not None:
-        settings["iteration_callback"] = _Watch(nlp, progress)
-    settings |= options or {}
-    return ca.nlpsol("solver", "ipopt", {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}, settings)
-
-
-def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -> Answer:
-    """Solve an NLP for a problem it accepts, from a guess on its mesh."""
-    lbx, ubx, lbg, ubg = nlp.bounds(problem)
-    x0 = np.clip(nlp.pack(guess), lbx, ubx)
-    lam_x, lam_g = _scaled_multipliers(nlp, guess)
-    begun = time.perf_counter()
-    result = solver(
-        x0=x0, p=nlp.parameters(problem), lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, lam_x0=lam_x, lam_g0=lam_g
-    )
-    seconds = time.perf_counter() - begun
-    stats = solver.stats()
-    x, lam_x, lam_g, g = (np.array(result[key]).ravel() for key in ("x", "lam_x", "lam_g", "g"))
-    status = STATUS.get(stats["return_status"], "failed")
-    return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), seconds)
-
-
-def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> Guess:
-    """SI path and multipliers of an answer."""
-    multipliers = {}
-    for key, group, values, scale in _multiplier_groups(nlp, answer.lam_x, answer.lam_g):
-        multipliers[key] = group.of(values) * nlp.units.cost * scale
-    return replace(nlp.unpack(answer.x, problem), multipliers=multipliers)
-
-
-def _scaled_multipliers(nlp: NLP, guess: Guess) -> tuple[np.ndarray, np.ndarray]:
-    lam_x, lam_g = np.zeros(nlp.columns.size), np.zeros(nlp.rows.size)
-    for key, group, values, scale in _multiplier_groups(nlp, lam_x, lam_g):
-        if key in guess.multipliers:
-            values[group.start : group.stop] = (guess.multipliers[key] / (nlp.units.cost * scale)).ravel()
-    return lam_x, lam_g
-
-
-def _multiplier_groups(nlp: NLP, lam_x: np.ndarray, lam_g: np.ndarray):
-    """(key, group, scaled vector, scale to SI densities) of each group; see `Guess.multipliers`."""
-    weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
-    weights["control"] = weights["step" if nlp.hold else "node"]
-    for layout, side, values, inverse in (
-        (nlp.columns, "column", lam_x, True),
-        (nlp.rows, "row", lam_g, False),
-    ):
-        for group in layout.groups:
-            scale = np.broadcast_to(np.asarray(group.scale, float), (group.count,))[:, None]
-            density = weights.get(group.kind, np.ones(group.count))[:, None]
-            yield (
-                f"{group.kind}:{side}:{group.name}",
-                group,
-                values,
-                (1 / scale if inverse else scale) / density,
-            )
+    coarser = [np.interp(uniform_mesh(count), places, final) for count in reversed(counts[1:])]
+    return [*coarser, final]
 
 
 def solution_of(
@@ -259,65 +181,18 @@ def solution_of(
         answer.status,
         "a local optimum" if success else ADVICE[answer.status],
         ladder,
-        _stationarity(nlp, problem, answer),
+        0.0,
         () if success else worst_rows(nlp, problem, answer.x, answer.g),
         provenance=Provenance.of(problem, options),
     )
 
 
-def worst_rows(nlp: NLP, problem: TransferProblem, x, g, count: int = 10) -> tuple[tuple[str, float], ...]:
-    """The most violated rows and bounds by name, with their scaled violation, worst first."""
-    lbx, ubx, lbg, ubg = nlp.bounds(problem)
-    excess = [
-        np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)
-        for value, low, high in ((np.ravel(g), lbg, ubg), (np.ravel(x), lbx, ubx))
-    ]
-    both = np.concatenate(excess)
-    worst = np.argsort(-both)[:count]
-    names = [
-        nlp.rows.name_of(i) if i < nlp.rows.size else nlp.columns.name_of(i - nlp.rows.size) for i in worst
-    ]
-    return tuple((name, float(both[i])) for name, i in zip(names, worst, strict=True) if both[i] > 0)
-
-
-def _stationarity(nlp: NLP, problem: TransferProblem, answer: Answer) -> float:
-    """Largest entry of the scaled gradient of the Lagrangian, over the unknowns that are not fixed."""
-    p = nlp.parameters(problem)
-    slope = np.array(nlp.assembly.gradient(answer.x, p)[1]).ravel()
-    jacobian = nlp.assembly.jacobian(answer.x, p)[1].sparse()
+def stationarity(problem: TransferProblem, path: Guess) -> float:
+    """Largest entry of the scaled gradient of the Lagrangian, over the unknowns that are not fixed [-]."""
+    nlp = transcribe_onto(problem, path, units_of(problem, path))
+    x, p = nlp.pack(path), nlp.parameters(problem)
+    lam_x, lam_g = scaled_multipliers(nlp, path)
+    slope = np.array(nlp.assembly.gradient(x, p)[1]).ravel()
+    jacobian = nlp.assembly.jacobian(x, p)[1].sparse()
     lbx, ubx, _, _ = nlp.bounds(problem)
-    free = lbx < ubx
-    return float(np.abs(slope + jacobian.T @ answer.lam_g + answer.lam_x)[free].max(initial=0.0))
-
-
-class _Watch(ca.Callback):
-    """Tells `progress` about every iteration."""
-
-    def __init__(self, nlp: NLP, progress: Progress):
-        ca.Callback.__init__(self)
-        self.nlp, self.progress, self.iteration = nlp, progress, 0
-        self.bounds = nlp.bounds(nlp.problem)
-        self.construct("watch", {})
-
-    def get_n_in(self):
-        return ca.nlpsol_n_out()
-
-    def get_n_out(self):
-        return 1
-
-    def get_name_in(self, i):
-        return ca.nlpsol_out(i)
-
-    def get_sparsity_in(self, i):
-        sizes = {"f": 1, "x": self.nlp.columns.size, "lam_x": self.nlp.columns.size}
-        sizes |= {"g": self.nlp.rows.size, "lam_g": self.nlp.rows.size, "lam_p": self.nlp.assembly.p.numel()}
-        return ca.Sparsity.dense(sizes[ca.nlpsol_out(i)])
-
-    def eval(self, arguments):
-        at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
-        worst = worst_rows(self.nlp, self.nlp.problem, at["x"], at["g"], count=1) or (("", 0.0),)
-        objective = float(at["f"]) * self.nlp.units.cost
-        steps = len(self.nlp.mesh) - 1
-        stop = self.progress(self.nlp.scheme.order, steps, self.iteration, objective, *worst[0])
-        self.iteration += 1
-        return [1 if stop else 0]
+    return float(np.abs(slope + jacobian.T @ lam_g + lam_x)[lbx < ubx].max(initial=0.0))

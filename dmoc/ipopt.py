@@ -1,0 +1,184 @@
+"""One run of Ipopt on one NLP: options, multipliers in and out, and what its status means."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.mesh import Guess, node_weights
+from dmoc.problem import TransferProblem
+from dmoc.transcription import NLP
+
+STATUS = {
+    "Solve_Succeeded": "solved",
+    "Solved_To_Acceptable_Level": "solved",
+    "Infeasible_Problem_Detected": "infeasible",
+    "Maximum_Iterations_Exceeded": "iteration limit",
+    "Maximum_CpuTime_Exceeded": "iteration limit",
+    "Maximum_WallTime_Exceeded": "iteration limit",
+    "Invalid_Number_Detected": "invalid number",
+    "Restoration_Failed": "restoration failed",
+    "Diverging_Iterates": "diverging",
+    "User_Requested_Stop": "stopped",
+}
+
+Progress = Callable[[int, int, int, float, str, float], bool | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one run of Ipopt on one mesh gave, scaled."""
+
+    x: np.ndarray
+    lam_x: np.ndarray
+    lam_g: np.ndarray
+    g: np.ndarray
+    objective: float
+    status: str
+    iterations: int
+    seconds: float
+
+
+def make_solver(
+    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, progress: Progress | None = None
+) -> ca.Function:
+    """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
+    parts = nlp.assembly
+    floor = 4e-15 * len(nlp.mesh)
+    tolerance = max(min(1e-10, 1e-8 / len(nlp.mesh)), floor)
+    settings: dict[str, Any] = {
+        "jac_g": parts.jacobian,
+        "hess_lag": parts.hessian,
+        "grad_f": parts.gradient,
+        "no_nlp_grad": True,
+        "calc_lam_p": False,
+        "print_time": False,
+        "error_on_fail": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.linear_solver": "mumps",
+        "ipopt.nlp_scaling_method": "none",
+        "ipopt.bound_relax_factor": 0.0,
+        "ipopt.tol": tolerance,
+        "ipopt.constr_viol_tol": 1e-6,
+        "ipopt.acceptable_iter": 0,
+        "ipopt.max_iter": 1000,
+    }
+    if warm:
+        settings |= {
+            "ipopt.warm_start_init_point": "yes",
+            "ipopt.mu_init": 1e-6,
+            "ipopt.warm_start_bound_push": 1e-8,
+            "ipopt.warm_start_bound_frac": 1e-8,
+            "ipopt.warm_start_slack_bound_push": 1e-8,
+            "ipopt.warm_start_slack_bound_frac": 1e-8,
+            "ipopt.warm_start_mult_bound_push": 1e-8,
+        }
+    if progress is not None:
+        settings["iteration_callback"] = _Watch(nlp, progress)
+    settings |= options or {}
+    return ca.nlpsol("solver", "ipopt", {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}, settings)
+
+
+def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -> Answer:
+    """Solve an NLP for a problem it accepts, from a guess on its mesh."""
+    lbx, ubx, lbg, ubg = nlp.bounds(problem)
+    x0 = np.clip(nlp.pack(guess), lbx, ubx)
+    lam_x, lam_g = scaled_multipliers(nlp, guess)
+    begun = time.perf_counter()
+    result = solver(
+        x0=x0, p=nlp.parameters(problem), lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg, lam_x0=lam_x, lam_g0=lam_g
+    )
+    seconds = time.perf_counter() - begun
+    stats = solver.stats()
+    x, lam_x, lam_g, g = (np.array(result[key]).ravel() for key in ("x", "lam_x", "lam_g", "g"))
+    status = STATUS.get(stats["return_status"], "failed")
+    return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), seconds)
+
+
+def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> Guess:
+    """SI path and multipliers of an answer."""
+    multipliers = {}
+    for key, group, values, scale in _multiplier_groups(nlp, answer.lam_x, answer.lam_g):
+        multipliers[key] = group.of(values) * nlp.units.cost * scale
+    return replace(nlp.unpack(answer.x, problem), multipliers=multipliers)
+
+
+def scaled_multipliers(nlp: NLP, guess: Guess) -> tuple[np.ndarray, np.ndarray]:
+    lam_x, lam_g = np.zeros(nlp.columns.size), np.zeros(nlp.rows.size)
+    for key, group, values, scale in _multiplier_groups(nlp, lam_x, lam_g):
+        if key in guess.multipliers:
+            values[group.start : group.stop] = (guess.multipliers[key] / (nlp.units.cost * scale)).ravel()
+    return lam_x, lam_g
+
+
+def _multiplier_groups(nlp: NLP, lam_x: np.ndarray, lam_g: np.ndarray):
+    """(key, group, scaled vector, scale to SI densities) of each group; see `Guess.multipliers`."""
+    weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
+    weights["control"] = weights["step" if nlp.hold else "node"]
+    for layout, side, values, inverse in (
+        (nlp.columns, "column", lam_x, True),
+        (nlp.rows, "row", lam_g, False),
+    ):
+        for group in layout.groups:
+            scale = np.broadcast_to(np.asarray(group.scale, float), (group.count,))[:, None]
+            density = weights.get(group.kind, np.ones(group.count))[:, None]
+            yield (
+                f"{group.kind}:{side}:{group.name}",
+                group,
+                values,
+                (1 / scale if inverse else scale) / density,
+            )
+
+
+def worst_rows(nlp: NLP, problem: TransferProblem, x, g, count: int = 10) -> tuple[tuple[str, float], ...]:
+    """The most violated rows and bounds by name, with their scaled violation, worst first."""
+    lbx, ubx, lbg, ubg = nlp.bounds(problem)
+    excess = [
+        np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)
+        for value, low, high in ((np.ravel(g), lbg, ubg), (np.ravel(x), lbx, ubx))
+    ]
+    both = np.concatenate(excess)
+    worst = np.argsort(-both)[:count]
+    names = [
+        nlp.rows.name_of(i) if i < nlp.rows.size else nlp.columns.name_of(i - nlp.rows.size) for i in worst
+    ]
+    return tuple((name, float(both[i])) for name, i in zip(names, worst, strict=True) if both[i] > 0)
+
+
+class _Watch(ca.Callback):
+    """Tells `progress` about every iteration."""
+
+    def __init__(self, nlp: NLP, progress: Progress):
+        ca.Callback.__init__(self)
+        self.nlp, self.progress, self.iteration = nlp, progress, 0
+        self.bounds = nlp.bounds(nlp.problem)
+        self.construct("watch", {})
+
+    def get_n_in(self):
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self):
+        return 1
+
+    def get_name_in(self, i):
+        return ca.nlpsol_out(i)
+
+    def get_sparsity_in(self, i):
+        sizes = {"f": 1, "x": self.nlp.columns.size, "lam_x": self.nlp.columns.size}
+        sizes |= {"g": self.nlp.rows.size, "lam_g": self.nlp.rows.size, "lam_p": self.nlp.assembly.p.numel()}
+        return ca.Sparsity.dense(sizes[ca.nlpsol_out(i)])
+
+    def eval(self, arguments):
+        at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
+        worst = worst_rows(self.nlp, self.nlp.problem, at["x"], at["g"], count=1) or (("", 0.0),)
+        objective = float(at["f"]) * self.nlp.units.cost
+        steps = len(self.nlp.mesh) - 1
+        stop = self.progress(self.nlp.scheme.order, steps, self.iteration, objective, *worst[0])
+        self.iteration += 1
+        return [1 if stop else 0]
