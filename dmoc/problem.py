@@ -85,6 +85,7 @@ class TransferProblem:
         for part in parts:
             part.check_dimension(self.dimension)
         self._check_least_time()
+        self._check_ends()
 
     @property
     def dimension(self) -> int:
@@ -105,6 +106,22 @@ class TransferProblem:
     def duration_bounds(self) -> tuple[float, float]:
         """Shortest and longest duration [s]; equal if it is fixed."""
         return self.duration if isinstance(self.duration, tuple) else (self.duration, self.duration)
+
+    def _check_ends(self) -> None:
+        """A boundary state that breaks a constraint can never be met, whatever the path."""
+        for end in ("start", "goal"):
+            position, velocity = getattr(self, end).fixed()
+            for i, constraint in enumerate(self.constraints):
+                known = velocity if constraint.unit == "m/s" else position
+                if np.isnan(known).any():
+                    continue
+                excess = float(constraint.excess(position[None], velocity[None])[0])
+                if excess > 1e-9 * (np.abs(known).max() or 1.0):
+                    name = f"{type(constraint).__name__} (constraint {i + 1})"
+                    raise ValueError(
+                        f"{end} breaks {name} by {excess:.3g} {constraint.unit}: the body {constraint.words()}; "
+                        f"move the {end} or the constraint"
+                    )
 
     def _check_least_time(self) -> None:
         if not isinstance(self.objective, Time):
