@@ -251,7 +251,7 @@ def _open(file: Path) -> Any:
 
     try:
         # nothing is decoded: the numbers come back as they were written
-        with xarray.open_dataset(file, engine="h5netcdf", decode_cf=False) as dataset:
+        with xarray.open_dataset(file, engine="h5netcdf", decode_cf=False, phony_dims="access") as dataset:
             return dataset.load()
     except Exception as error:  # the layers below raise whatever they trip over
         raise ValueError(f"{file} is damaged or cut short ({_one_line(error)}); {AGAIN}") from None
