@@ -22,6 +22,11 @@ class Actuator(ABC):
 
     adjustable: ClassVar[tuple[str, ...]] = ()
 
+    @property
+    def burns(self) -> bool:
+        """Whether it uses propellant, so that the mass changes."""
+        return False
+
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the actuator has no meaning in this many dimensions."""
 
@@ -49,6 +54,21 @@ class Actuator(ABC):
     def rows(self, u: Any) -> list[Row]:
         """Further limits that are not plain bounds, dimensionless."""
         return []
+
+    def throttle(self, u: Any) -> Any:
+        """Magnitude of the thrust that costs propellant [N]; None where the controls do not tell."""
+        return None
+
+    def flow(self, u: Any) -> Any:
+        """Propellant burnt [kg/s]; None where the mass does not change."""
+        return None
+
+    def metered(self) -> Actuator:
+        """The same actuator with the magnitude of its force among the controls, which least fuel needs."""
+        raise ValueError(
+            f"least fuel with {type(self).__name__} has no optimum: impulses without limit cost least; "
+            "use BallForce(limit), BoxForce(limit) or Engine(max_thrust, ...)"
+        )
 
     def force_limit(self) -> float | None:
         """The largest force [N] along one axis, or None if there is no limit."""
@@ -95,6 +115,12 @@ class BoxForce(Actuator):
         limit = np.broadcast_to(np.asarray(self.limit, float), (dimension,)).copy()
         return -limit, limit
 
+    def metered(self) -> Actuator:
+        from dmoc.engines import Engine
+
+        limits = np.broadcast_to(np.asarray(self.limit, float), (3,))
+        return Engine(float(np.linalg.norm(limits)), box=self.limit)
+
     def force_limit(self) -> float:
         return float(np.max(self.limit))
 
@@ -125,6 +151,11 @@ class BallForce(Actuator):
 
     def rows(self, u: Any) -> list[Row]:
         return [Row("magnitude", ca.dot(u, u) / self.limit**2, -np.inf, 1.0)]
+
+    def metered(self) -> Actuator:
+        from dmoc.engines import Engine
+
+        return Engine(self.limit)
 
     def force_limit(self) -> float:
         return self.limit

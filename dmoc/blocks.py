@@ -66,6 +66,8 @@ class Transcript:
         columns = Layout().add("position", "node", axes, nodes, units.length)
         labels = problem.actuator.labels(problem.dimension)
         columns = columns.add("force", "control", labels, self.steps if self.hold else nodes, units.force)
+        if problem.actuator.burns:
+            columns = columns.add("mass", "node", ("",), nodes, units.mass)
         columns = columns.add("start.velocity", "end", axes, 1, speed)
         columns = columns.add("goal.velocity", "end", axes, 1, speed)
         return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
@@ -81,7 +83,7 @@ class Transcript:
         local = _Local(self, self.steps * self.rule.degree + 1)
         r = local.take("position", self.columns["position"].indices)
         u = None if self.hold else local.take("force", self.columns["force"].indices)
-        m, duration = self.mass, local.duration()
+        m, duration = local.mass(slice(None)), local.duration()
         fraction, weight = (
             local.number(node_fractions(self.mesh, self.rule)),
             local.number(node_weights(self.mesh, self.rule)),
@@ -105,9 +107,9 @@ class Transcript:
         local = _Local(self, self.steps)
         nodes = step_nodes(self.steps, rule)
         r = [local.take("position", self.columns["position"].indices[:, at]) for at in nodes]
-        duration, costly = local.duration(), self._cost_in_steps()
+        duration, costly = local.duration(), self._cost_in_steps() or problem.actuator.burns
         begin, length = local.number(self.mesh[:-1]), local.number(np.diff(self.mesh))
-        h, m = length * duration, [self.mass] * (rule.degree + 1)
+        h, m = length * duration, [local.mass(at) for at in nodes]
         u: list = [None] * (rule.degree + 1)
         if self.hold:
             u = [local.take("force", self.columns["force"].indices)] * (rule.degree + 1)
@@ -132,13 +134,27 @@ class Transcript:
             local.limit(_title(constraint, i), "step", rows)
         if self.hold:
             local.limit("actuator", "control", self.actuator.rows(u[0]))
-        if costly:
+        if problem.actuator.burns:
+            self._burn(local, h, m, [self.actuator.flow(control) for control in u])
+        if self._cost_in_steps():
             v = step_velocities(rule, h, r)
             rates = [
                 self._rate(t0 + c * h, r[j] + self.origin, v[j], u[j], m[j]) for j, c in enumerate(rule.points)
             ]
             local.cost = h * weighted(rule.weights, rates)
         return local.block("step")
+
+    def _burn(self, local: _Local, h: Any, m: list, flow: list) -> None:
+        """Node masses by the Lobatto IIIA matrix A: m_i = m_0 - h sum_j A_ij flow_j, s rows a step.
+
+        The last row of A is the weights, so the mass used equals the quadrature of the flow exactly.
+        """
+        rows = [
+            (m[i] - m[0] + h * weighted(row, flow)) / self.units.mass
+            for i, row in enumerate(self.rule.integral[1:], start=1)
+        ]
+        local.limit("mass_flow", "between", [Row("", rows[-1], 0.0, 0.0)])
+        local.limit("mass_inside", "step", [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(rows[:-1])])
 
     def _ends_block(self) -> Block:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
@@ -151,8 +167,8 @@ class Transcript:
         }
         start_time, goal_time = self.start_time, self.start_time + local.duration()
         states = {
-            "start": (start_time, first, v["start"], self.mass),
-            "goal": (goal_time, last, v["goal"], self.mass),
+            "start": (start_time, first, v["start"], local.mass([0])),
+            "goal": (goal_time, last, v["goal"], local.mass([-1])),
         }
         dynamics = self.rows["dynamics"]
         local.add(dynamics, self.dynamics.point(*states["start"])[1], [0])
@@ -198,6 +214,12 @@ class _Local:
         self._data.append(ca.SX.sym("d"))
         self._values.append(values)
         return self._data[-1]
+
+    def mass(self, nodes: Any) -> ca.SX:
+        """The mass at nodes: unknowns if it burns away, a parameter if not."""
+        if not self.transcript.problem.actuator.burns:
+            return self.transcript.mass
+        return self.take("mass", self.transcript.columns["mass"].indices[:, nodes])
 
     def duration(self) -> ca.SX:
         """The duration: an unknown if it is free, a parameter if not."""

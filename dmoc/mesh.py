@@ -78,7 +78,12 @@ class Guess:
         # the path must be smooth: its second differences are the forces
         position = CubicSpline(old, self.position, bc_type=((1, ends[0]), (1, ends[1])))(new)
         position[0], position[-1] = self.position[0], self.position[-1]
-        places = {"node": (old, new), "step": (old_middles, middles), "control": (old_control, new_control)}
+        places = {
+            "node": (old, new),
+            "step": (old_middles, middles),
+            "between": (old_middles, middles),
+            "control": (old_control, new_control),
+        }
         return replace(
             self,
             mesh=mesh,

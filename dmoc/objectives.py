@@ -18,6 +18,7 @@ class Objective(ABC):
     """
 
     unit: ClassVar[str] = ""
+    metered: ClassVar[bool] = False
     adjustable: ClassVar[tuple[str, ...]] = ()
 
     def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
@@ -31,6 +32,10 @@ class Objective(ABC):
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         """Cost per second where it depends on what the actuator makes of its controls."""
         return self.running(t, q, v, u, m)
+
+    def unit_with(self, actuator: Actuator) -> str:
+        """The unit of the objective with this actuator."""
+        return self.unit
 
     def words(self) -> str:
         """One line for a person."""
@@ -46,6 +51,20 @@ class Effort(Objective):
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         force = actuator.force(u)
         return 0.5 * ca.dot(force, force)
+
+
+@dataclass(frozen=True)
+class Fuel(Objective):
+    """Least fuel: the propellant burnt [kg], or without an exhaust velocity the integral of |F| dt [N s]."""
+
+    unit: ClassVar[str] = "kg"
+    metered: ClassVar[bool] = True
+
+    def unit_with(self, actuator: Actuator) -> str:
+        return "kg" if actuator.burns else "N s"
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return actuator.flow(u) if actuator.burns else actuator.throttle(u)
 
 
 @dataclass(frozen=True)

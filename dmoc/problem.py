@@ -77,6 +77,8 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
+        if self.objective.metered:
+            object.__setattr__(self, "actuator", self.actuator.metered())
         if self.start.dimension != self.goal.dimension:
             raise ValueError(
                 f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
@@ -86,6 +88,11 @@ class TransferProblem:
             part.check_dimension(self.dimension)
         self._check_least_time()
         self._check_ends()
+        if getattr(self.actuator, "dry_mass", 0.0) >= self.mass:
+            raise ValueError(
+                f"the actuator's dry_mass must be less than the mass; got {self.actuator.dry_mass:g} "  # type: ignore[attr-defined]
+                f"and {self.mass:g} kg"
+            )
 
     @property
     def dimension(self) -> int:

@@ -88,7 +88,8 @@ def solve(
     meshes = [final] if first.multipliers else _ladder(dynamics, problem, first)
     climb = _Climb(problem, options, progress)
     known = first
-    for ends in meshes:
+    for ends, at in _stages(problem, meshes):
+        climb.problem = at
         solved = climb.solve_on(known.onto(ends, order, hold))
         if not solved and not first.multipliers:
             # a coarse mesh may have no path where a finer one does: go on from the first guess
@@ -98,6 +99,22 @@ def solve(
         if climb.answer.status == "stopped":
             break
     return solution_of(climb.nlp, problem, climb.answer, tuple(climb.levels), options)
+
+
+def _stages(problem: TransferProblem, meshes: list[np.ndarray]) -> list[tuple[np.ndarray, TransferProblem]]:
+    """The meshes, each with its problem: where |F| is rounded at zero, more so on coarse meshes."""
+    final = getattr(problem.actuator, "smoothing", None)
+    if final is None:
+        return [(mesh, problem) for mesh in meshes]
+    count = max(int(np.ceil(np.log10(1e-2 / final))), 0)
+    widths = [1e-2 * 0.1**i for i in range(count)] + [final]
+    repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
+    widths = widths + [final] * (len(meshes) - len(widths))
+
+    def rounded(width: float) -> TransferProblem:
+        return replace(problem, actuator=replace(problem.actuator, smoothing=width))  # type: ignore[call-overload]
+
+    return [(mesh, rounded(width)) for mesh, width in zip(repeated, widths, strict=True)]
 
 
 class _Climb:

@@ -91,6 +91,9 @@ class NLP:
         put("force", *problem.actuator.bounds(n))
         if problem.free_duration:
             put("duration", *problem.duration_bounds)
+        if problem.actuator.burns:
+            put("mass", problem.actuator.dry_mass, np.inf)  # type: ignore[attr-defined]
+            lower[self.columns["mass"].start] = upper[self.columns["mass"].start] = problem.mass
         for end, name, place in ((problem.start, "start", 0), (problem.goal, "goal", -1)):
             position, velocity = end.fixed()
             places = self.columns["position"].indices[:, place]
@@ -119,6 +122,7 @@ class NLP:
         parts = {
             "position": guess.position - self.units.origin,
             "force": guess.control,
+            "mass": guess.mass,
             "start.velocity": guess.start_velocity,
             "goal.velocity": guess.goal_velocity,
             "duration": guess.duration,
@@ -140,7 +144,7 @@ class NLP:
             float(get["duration"].item()) if "duration" in get else problem.duration_bounds[0],
             get["position"] + self.units.origin,
             get["force"],
-            np.full(nodes, problem.mass),
+            get["mass"][:, 0] if "mass" in get else np.full(nodes, problem.mass),
             get["start.velocity"][0],
             get["goal.velocity"][0],
         )
