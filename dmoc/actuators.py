@@ -21,6 +21,9 @@ class Actuator(ABC):
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
+    # least mass [kg], and the rounding of |F| at zero where a throttle is tied to it [-]
+    dry_mass: float = 0.0
+    smoothing: float | None = None
 
     @property
     def burns(self) -> bool:

@@ -91,7 +91,8 @@ class Engine(_Burner):
         object.__setattr__(self, "min_thrust", number("min_thrust", self.min_thrust, "N", nonnegative=True))
         if self.min_thrust >= self.max_thrust:
             raise ValueError(
-                f"Engine: min_thrust must be less than max_thrust; got {self.min_thrust:g} and {self.max_thrust:g} N"
+                "Engine: min_thrust must be less than max_thrust; "
+                f"got {self.min_thrust:g} and {self.max_thrust:g} N"
             )
         object.__setattr__(self, "smoothing", number("smoothing", self.smoothing, "-", positive=True))
         if self.box is not None:
@@ -176,7 +177,8 @@ class Nozzles(_Burner):
     def check_dimension(self, dimension: int) -> None:
         if len(self.directions[0]) != dimension:
             raise ValueError(
-                f"Nozzles: directions have {len(self.directions[0])} entries but the problem has {dimension} dimensions"
+                f"Nozzles: directions have {len(self.directions[0])} entries but the problem has {dimension} "
+                f"dimensions; give {dimension} entries each"
             )
 
     def size(self, dimension: int) -> int:
@@ -199,5 +201,5 @@ class Nozzles(_Burner):
 
     def words(self) -> str:
         return (
-            f"{len(self.directions)} fixed nozzles of at most {max(self.max_thrust):g} N{self._burning_words()}"
+            f"{len(self.directions)} fixed nozzles of at most {self.force_limit():g} N{self._burning_words()}"
         )

@@ -88,9 +88,9 @@ class TransferProblem:
             part.check_dimension(self.dimension)
         self._check_least_time()
         self._check_ends()
-        if getattr(self.actuator, "dry_mass", 0.0) >= self.mass:
+        if self.actuator.dry_mass >= self.mass:
             raise ValueError(
-                f"the actuator's dry_mass must be less than the mass; got {self.actuator.dry_mass:g} "  # type: ignore[attr-defined]
+                f"the actuator's dry_mass must be less than the mass; got {self.actuator.dry_mass:g} "
                 f"and {self.mass:g} kg"
             )
 
@@ -126,8 +126,8 @@ class TransferProblem:
                 if excess > 1e-9 * (np.abs(known).max() or 1.0):
                     name = f"{type(constraint).__name__} (constraint {i + 1})"
                     raise ValueError(
-                        f"{end} breaks {name} by {excess:.3g} {constraint.unit}: the body {constraint.words()}; "
-                        f"move the {end} or the constraint"
+                        f"{end} breaks {name} by {excess:.3g} {constraint.unit}: "
+                        f"the body {constraint.words()}; move the {end} or the constraint"
                     )
 
     def _check_least_time(self) -> None:

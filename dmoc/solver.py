@@ -103,7 +103,7 @@ def solve(
 
 def _stages(problem: TransferProblem, meshes: list[np.ndarray]) -> list[tuple[np.ndarray, TransferProblem]]:
     """The meshes, each with its problem: where |F| is rounded at zero, more so on coarse meshes."""
-    final = getattr(problem.actuator, "smoothing", None)
+    final = problem.actuator.smoothing
     if final is None:
         return [(mesh, problem) for mesh in meshes]
     count = max(int(np.ceil(np.log10(1e-2 / final))), 0)
@@ -111,10 +111,9 @@ def _stages(problem: TransferProblem, meshes: list[np.ndarray]) -> list[tuple[np
     repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
     widths = widths + [final] * (len(meshes) - len(widths))
 
-    def rounded(width: float) -> TransferProblem:
-        return replace(problem, actuator=replace(problem.actuator, smoothing=width))  # type: ignore[call-overload]
-
-    return [(mesh, rounded(width)) for mesh, width in zip(repeated, widths, strict=True)]
+    engine: Any = problem.actuator
+    rounded = [replace(problem, actuator=replace(engine, smoothing=width)) for width in widths]
+    return list(zip(repeated, rounded, strict=True))
 
 
 class _Climb:

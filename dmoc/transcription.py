@@ -92,7 +92,7 @@ class NLP:
         if problem.free_duration:
             put("duration", *problem.duration_bounds)
         if problem.actuator.burns:
-            put("mass", problem.actuator.dry_mass, np.inf)  # type: ignore[attr-defined]
+            put("mass", problem.actuator.dry_mass, np.inf)
             lower[self.columns["mass"].start] = upper[self.columns["mass"].start] = problem.mass
         for end, name, place in ((problem.start, "start", 0), (problem.goal, "goal", -1)):
             position, velocity = end.fixed()
