@@ -118,3 +118,12 @@ def test_node_weights_of_a_mesh_integrate_over_the_whole_of_it(rule):
         np.testing.assert_allclose(nodes[:: rule.degree], mesh, rtol=0, atol=ROUND_OFF)
         for degree in range(2 * rule.degree):
             assert abs(weights @ nodes**degree - 1 / (degree + 1)) < ROUND_OFF
+
+
+def test_hermite_slopes_are_exact_two_degrees_higher(rule):
+    """Node values and both end slopes fix a polynomial of degree s + 2."""
+    c, s = rule.points, rule.degree
+    for degree in range(s + 3):
+        slopes = degree * c ** max(degree - 1, 0)
+        given = np.concatenate([c**degree, slopes[[0, -1]]])
+        np.testing.assert_allclose(rule.hermite_slopes() @ given, slopes, rtol=0, atol=1e-12)
