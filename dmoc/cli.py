@@ -1,0 +1,285 @@
+"""The command line: one small function a verb."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+if TYPE_CHECKING:
+    from dmoc.library import ProblemFile
+    from dmoc.solution import Solution
+    from dmoc.verify import Report
+
+# Typer exports only one of its usage errors; this is the class of all of them.
+USAGE_ERROR: Any = typer.BadParameter.__base__
+SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
+    epilog="Exit codes: 0 solved and every check holds, 2 bad input, 3 not solved, 4 a check failed.",
+)
+
+Name = Annotated[
+    str, typer.Argument(metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.")
+]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="A solution saved with `dmoc solve --out`.")]
+Source = Annotated[
+    str | None,
+    typer.Option("--problem", metavar="PROBLEM", help="The problem, if not the one named in the file."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
+]
+Order = Annotated[int | None, typer.Option(help="2 (the default), 4, 6 or 8.")]
+Steps = Annotated[
+    int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
+]
+Hold = Annotated[bool, typer.Option("--hold", help="Forces constant over each step.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+@app.command("list", epilog="Example: dmoc list")
+def list_problems() -> None:
+    """List the problem files, those in ./problems first."""
+    from dmoc import library, report
+
+    console = report.console()
+    found = library.catalogue()
+    if not found:
+        listing = " and ".join(map(str, library.folders()))
+        raise ValueError(f"no problem files; looked in {listing}")
+    console.print(report.catalogue(found))
+
+
+@app.command(epilog="Example: dmoc show free_flyer")
+def show(problem: Name, settings: Settings = None) -> None:
+    """Say what a problem is: the scene, its parameters, the size of its NLP."""
+    from dmoc import report
+    from dmoc.solver import DEFAULT_STEPS
+    from dmoc.transcription import transcribe
+
+    file, case = _problem(problem, settings)
+    nlp = transcribe(case, DEFAULT_STEPS[2])
+    console = report.console()
+    for part in (file.docstring, report.scene(case), report.parameters(file.parameters), report.sizes(nlp)):
+        console.print(part)
+        console.print()
+    console.print(f"{file.path}; solve it with: dmoc solve {problem}")
+
+
+@app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")
+def solve(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    tol: Annotated[
+        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
+    ] = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
+    as_json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,
+) -> None:
+    """Solve a problem, check the answer, show both."""
+    import dmoc
+    from dmoc import report
+    from dmoc.verify import verify
+
+    _writable(out)
+    _writable(plot, drawn=True)
+    file, case = _problem(problem, settings)
+    start = None if guess is None else dmoc.load(guess)
+    with report.live_line(not (as_json or quiet), case.objective.unit_with(case.actuator)) as progress:
+        solution = dmoc.solve(
+            case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
+        )
+    _raise_if_interrupted()
+    verdict = verify(solution) if solution.success else None
+    _raise_if_interrupted()
+    if out is not None:
+        solution.save(out, source_hash=file.source_hash)
+    if plot is not None:
+        _draw(solution, plot, verdict)
+    _show(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
+
+
+@app.command("simulate", epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
+def march(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    controls: Annotated[
+        Path | None, typer.Option(help="A saved solution whose controls to apply; none: coast.")
+    ] = None,
+) -> None:
+    """March the integrator forward from the start, without optimisation."""
+    import dmoc
+    from dmoc import report
+    from dmoc.simulate import simulate
+
+    if controls is not None and (order, steps, hold) != (None, None, False):
+        raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
+    _, case = _problem(problem, settings)
+    known = None if controls is None else dmoc.load(controls).attach(case)
+    trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
+    _raise_if_interrupted()
+    report.console().print(report.motion(trajectory, case, coast=known is None))
+
+
+@app.command(epilog="Example: dmoc check flight.nc")
+def check(file: File, problem: Source = None, as_json: Json = False) -> None:
+    """Check a saved solution again, against its problem file."""
+    from dmoc.verify import verify
+
+    solution = _attached(file, problem)
+    verdict = verify(solution)
+    _raise_if_interrupted()
+    _show(solution, verdict, as_json, quiet=False, written=[])
+
+
+@app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
+def plot(
+    file: File,
+    out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
+    problem: Source = None,
+) -> None:
+    """Draw a saved solution."""
+    import dmoc
+    from dmoc import report
+
+    target = file.with_suffix(".png") if out is None else out
+    _writable(target, drawn=True)
+    try:
+        solution = _attached(file, problem)
+    except ValueError as error:
+        solution = dmoc.load(file)
+        if problem is not None:
+            raise
+        _warn(f"zones and limits are left out: {error}")
+    _draw(solution, target, None)
+    report.console().print(f"wrote {target}")
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line; every bad input becomes one line on stderr and exit code 2."""
+    given = sys.argv[1:] if arguments is None else arguments
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        code = app(args=given or ["--help"], standalone_mode=False) or SOLVED
+    except USAGE_ERROR as error:
+        _fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    except (ValueError, OSError) as error:
+        _fail(f"error: {error}", BAD_INPUT)
+    if code == INTERRUPTED:
+        _fail("interrupted", INTERRUPTED)
+    sys.exit(code)
+
+
+def _problem(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
+    """The problem file, and the problem made with the values of --set."""
+    from dmoc.library import load_problem, parse_settings
+
+    values = parse_settings(settings or ())
+    file = load_problem(name)
+    return file, file.make(**values)
+
+
+def _attached(path: Path, source: str | None) -> Solution:
+    """A saved solution with its problem: the one given, else the one it names.
+
+    The name in a file is only ever looked up in the problem folders: a file must not choose what is run.
+    """
+    import dmoc
+    from dmoc.library import load_problem
+
+    solution = dmoc.load(path)
+    known = solution.provenance
+    if source is None and not known.problem_name.isidentifier():
+        raise ValueError(f"{path} names no problem file ({known.problem_name!r}); give it with --problem PATH")
+    try:
+        file = load_problem(source or known.problem_name)
+    except ValueError as error:
+        raise ValueError(
+            error if source else f"{error}; {path} was made from it: give it with --problem PATH"
+        ) from None
+    attached = solution.attach(file.make(**known.parameters))
+    if known.source_hash != file.source_hash:
+        _warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
+    return attached
+
+
+def _writable(path: Path | None, drawn: bool = False) -> None:
+    """ValueError unless a file can be written there: said before the work, not after it."""
+    if path is None:
+        return
+    folder = path.parent
+    if not folder.is_dir():
+        raise ValueError(f"cannot write {path}: there is no folder {folder}; create it first")
+    if path.is_dir() or not os.access(folder, os.W_OK):
+        raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
+    if drawn:
+        from dmoc.plot import SUFFIXES
+
+        if path.suffix.lower() not in SUFFIXES:
+            raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+
+
+def _draw(solution: Solution, path: Path, verdict: Report | None) -> None:
+    from dmoc.plot import save_figure
+
+    save_figure(solution, path, report=verdict)
+
+
+def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet: bool, written: list[Path]) -> None:
+    """Print the answer and exit with the code that says what it is worth."""
+    from dmoc import report
+
+    console = report.console()
+    if as_json:
+        print(report.as_json(report.result(solution, verdict)))
+    elif solution.success and verdict is not None:
+        console.print(report.answer(solution, verdict, quiet, written))
+    else:
+        console.print(report.failure(solution, quiet, written))
+    if not solution.success:
+        raise typer.Exit(NOT_SOLVED)
+    raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
+
+
+def _warn(message: str) -> None:
+    print(f"warning: {' '.join(message.split())}", file=sys.stderr)
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
+
+
+_interrupts: list[int] = []
+
+
+def _interrupt(number: int, frame: Any) -> None:
+    # CasADi swallows a KeyboardInterrupt inside a solve, so it is also written down
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def _raise_if_interrupted() -> None:
+    if _interrupts:
+        raise KeyboardInterrupt

@@ -1,0 +1,295 @@
+"""What a person sees: a scene in words, the ladder of meshes, the table of checks; and one JSON object."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from dmoc.docstrings import documented, first_line
+
+if TYPE_CHECKING:
+    from dmoc.effects.base import Effect
+    from dmoc.library import Parameter
+    from dmoc.problem import TransferProblem
+    from dmoc.simulate import Trajectory
+    from dmoc.solution import Solution
+    from dmoc.transcription import NLP
+    from dmoc.verify import Report
+
+# Width of what is written to a file or a pipe, where no terminal gives one.
+PLAIN_WIDTH = 110
+# The live line is redrawn at most this often [s]: drawing must not slow the solve down.
+REDRAW = 0.1
+
+
+def console(stderr: bool = False) -> Console:
+    """A console without markup: units stand in square brackets."""
+    stream = sys.stderr if stderr else sys.stdout
+    wide = None if stream.isatty() or "COLUMNS" in os.environ else PLAIN_WIDTH
+    return Console(file=stream, markup=False, highlight=False, emoji=False, width=wide)
+
+
+def scene(problem: TransferProblem) -> RenderableType:
+    """What is to be done, in words."""
+    shortest, longest = problem.duration_bounds
+    free = f"free between {shortest:g} and {longest:g} s"
+    return _pairs(
+        [
+            ("body", f"{problem.mass:g} kg, axes {', '.join('xyz'[: problem.dimension])}"),
+            ("start", problem.start.words()),
+            ("goal", problem.goal.words()),
+            ("duration", free if problem.free_duration else f"{shortest:g} s"),
+            ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
+            ("actuator", problem.actuator.words()),
+            ("objective", problem.objective.words().rstrip(".")),
+            ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
+        ]
+    )
+
+
+def effect_words(effect: Effect) -> str:
+    """One line for a person: what the effect's docstring says it is, and its numbers with units."""
+    if hasattr(effect, "words"):
+        return effect.words()
+    name, docstring = type(effect).__name__, type(effect).__doc__
+    summary = first_line(docstring)
+    # a dataclass without a docstring has its signature there
+    summary = "" if summary.startswith(f"{name}(") else summary.split(":")[0].rstrip(".")
+    entries = documented(docstring)
+    numbers = [name]
+    for name in [field.name for field in fields(effect)] if is_dataclass(effect) else ():
+        value = getattr(effect, name)
+        if value is not None:
+            numbers.append(f"{name} {value_words(value, entries[name].unit if name in entries else '')}")
+    return f"{summary} ({', '.join(numbers)})" if summary else ", ".join(numbers)
+
+
+def value_words(value: Any, unit: str = "") -> str:
+    """A number or a tuple of numbers with its unit; anything else by its name."""
+    if isinstance(value, (tuple, list)):
+        text = "(" + ", ".join(value_words(entry) for entry in value) + ")"
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        text = f"{value:.10g}"
+    else:
+        text = getattr(value, "__name__", None) or str(value)
+    return f"{text} {unit}" if unit and unit not in ("-", "1") else text
+
+
+def parameters(entries: Sequence[Parameter]) -> RenderableType:
+    """The parameters of a problem file with defaults and units."""
+    table = _table("parameter", "default", "unit", "what it is")
+    for entry in entries:
+        default = value_words(entry.default) if not isinstance(entry.default, str) else repr(entry.default)
+        table.add_row(entry.name, default, entry.unit, entry.description)
+    return table
+
+
+def sizes(nlp: NLP) -> str:
+    """The size of the NLP, in one line."""
+    jacobian, hessian = nlp.assembly.jacobian.nnz_out(1), nlp.assembly.hessian.nnz_out(0)
+    return (
+        f"{nlp.columns.size} unknowns, {nlp.rows.size} rows, {jacobian} nonzeros in the Jacobian and {hessian} "
+        f"in the Hessian's upper triangle (order {nlp.scheme.order}, {len(nlp.mesh) - 1} steps)"
+    )
+
+
+def ladder(solution: Solution) -> RenderableType:
+    """The meshes on the way, coarse to fine."""
+    objective = f"objective [{solution.provenance.objective_unit}]"
+    table = _table("order", "steps", "iterations", objective, "build [s]", "solve [s]", "status", right=6)
+    estimated = any(level.error is not None for level in solution.ladder)
+    if estimated:
+        table.add_column("error [-]")
+    for level in solution.ladder:
+        numbers = (level.order, level.steps, level.iterations)
+        row = [*map(str, numbers), f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
+        error = "" if level.error is None else f"{level.error:.1e}"
+        table.add_row(*row, level.status, *([error] if estimated else []))
+    return table
+
+
+def checks(report: Report) -> RenderableType:
+    """The checks, one line each."""
+    table = _table("check", "value", "limit", "unit", "verdict", "note")
+    for check in report.checks:
+        if check.value is None:
+            verdict = Text("does not apply", "dim")
+        else:
+            verdict = Text("holds", "green") if check.ok else Text("FAILS", "bold red")
+        value, limit = ("-" if number is None else f"{number:.4g}" for number in (check.value, check.limit))
+        table.add_row(check.name, value, limit, check.unit, verdict, check.note)
+    return table
+
+
+def answer(
+    solution: Solution, report: Report, quiet: bool = False, written: Sequence[Path] = ()
+) -> RenderableType:
+    """What a solve that succeeded shows: ladder, checks, files, and one line that sums it up."""
+    total = solution.build_s + solution.solve_s + report.seconds
+    found = (
+        f"Solved: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
+        "A local optimum: another guess may lead to a better one. "
+    )
+    broken = ", ".join(check.name for check in report.checks if not check.ok)
+    last = Text(found, "yellow" if broken else "green")
+    last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
+    if quiet:
+        return last
+    head = Text("Meshes, coarse to fine", "bold"), Text("Checks of the answer", "bold")
+    parts = (head[0], ladder(solution), *_accuracy(solution), Text(), head[1], checks(report), Text())
+    return Group(*parts, *_files(written), last)
+
+
+def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
+    """What a solve that failed shows: the worst rows by name, and what to try."""
+    head = Text(f"Not solved: {solution.status} after {solution.iterations} iterations.", "bold red")
+    advice = Text(f"What to try: {solution.message}.")
+    if quiet:
+        return Group(head, advice)
+    worst = _table("worst rows of the last iterate", "violation (scaled)")
+    for name, violation in solution.worst:
+        worst.add_row(name, f"{violation:.2e}")
+    return Group(ladder(solution), Text(), worst, Text(), *_files(written), head, advice)
+
+
+def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
+    """The end of a simulation, and how much its energy changed on the way."""
+    from dmoc.effects import Conservative
+
+    energy = trajectory.energy
+    most = float(abs(energy - energy[0]).max())
+    # only where nothing does work is a change of energy the scheme's own
+    kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
+    scale = float(abs(energy).max()) if kept else 0.0
+    share = f", {most / scale:.1e} of it" if scale else ""
+    rows = [
+        ("final time", f"{trajectory.time[-1]:.10g} s"),
+        ("final position", f"{value_words(trajectory.position[-1].tolist())} m"),
+        ("final velocity", f"{value_words(trajectory.velocity[-1].tolist())} m/s"),
+        ("final mass", f"{trajectory.mass[-1]:.10g} kg"),
+        ("energy", f"{energy[0]:.10g} J/kg at the start, {energy[-1]:.10g} J/kg at the end"),
+        ("energy drift" if kept else "energy change", f"{most:.2e} J/kg at most{share}"),
+    ]
+    return _pairs(rows)
+
+
+def catalogue(found: Sequence[tuple[str, str]]) -> RenderableType:
+    """Problem files with what they are."""
+    return _pairs(found)
+
+
+def figures(solution: Solution) -> str:
+    """Such as `effort 0.075 N^2 s, duration 26 s`."""
+    problem = solution.require_problem()
+    name, unit = type(problem.objective).__name__.lower(), solution.provenance.objective_unit
+    parts = [f"{name} {solution.objective:.8g} {unit}".rstrip()]
+    if name != "time":
+        parts.append(f"duration {solution.duration:.8g} s")
+    if solution.final_mass != problem.mass:
+        parts.append(f"final mass {solution.final_mass:.8g} kg")
+    return ", ".join(parts)
+
+
+def result(solution: Solution, report: Report | None) -> dict[str, Any]:
+    """The JSON object of a solve; numbers that are not finite become null."""
+    listed = report.checks if report else ()
+    return {
+        "problem": solution.require_problem().name,
+        "success": bool(solution.success),
+        "status": solution.status,
+        "objective": _finite(solution.objective),
+        "duration": _finite(solution.duration),
+        "final_mass": _finite(solution.final_mass),
+        "order": int(solution.order),
+        "steps": int(solution.steps),
+        "nodes": len(solution.position),
+        "iterations": int(solution.iterations),
+        "build_s": _finite(solution.build_s),
+        "solve_s": _finite(solution.solve_s),
+        "verify_s": _finite(report.seconds if report else 0.0),
+        "checks": {
+            check.name: {
+                "value": _finite(check.value),
+                "limit": _finite(check.limit),
+                "unit": check.unit,
+                "ok": bool(check.ok),
+            }
+            for check in listed
+        },
+    }
+
+
+def as_json(value: dict[str, Any]) -> str:
+    """One object, valid JSON even where a number was not finite."""
+    return json.dumps(value, indent=2, allow_nan=False)
+
+
+@contextmanager
+def live_line(wanted: bool, unit: str) -> Iterator[Callable | None]:
+    """A `progress` for `solve` that keeps one line of the terminal up to date, or None."""
+    screen = console(stderr=True)
+    if not (wanted and screen.is_terminal):
+        yield None
+        return
+    drawn = -math.inf
+    with Live(Text("building"), console=screen, auto_refresh=False, transient=True) as live:
+
+        def progress(
+            order: int, steps: int, iteration: int, objective: float, row: str, violation: float
+        ) -> bool:
+            nonlocal drawn
+            if time.monotonic() - drawn > REDRAW:
+                drawn = time.monotonic()
+                mesh = f"order {order}, {steps} steps, iteration {iteration}"
+                worst = f", worst {row} {violation:.1e}" if row else ""
+                line = f"{mesh}: objective {objective:.6g} {unit}{worst}"
+                live.update(Text(line, no_wrap=True, overflow="ellipsis"), refresh=True)
+            return False
+
+        yield progress
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _accuracy(solution: Solution) -> list[Text]:
+    """The estimated error and why this mesh, where a tolerance was asked for."""
+    if solution.error is None:
+        return []
+    error = f"estimated relative error {solution.error.largest:.1e}, asked for {solution.tolerance:g}"
+    return [Text(f"{solution.reason}; {error}")]
+
+
+def _files(written: Sequence[Path]) -> list[Text]:
+    return [Text(f"wrote {path}") for path in written]
+
+
+def _pairs(rows: Sequence[tuple[str, Any]]) -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for name, words in rows:
+        table.add_row(name, words if isinstance(words, str) else "\n".join(words))
+    return table
+
+
+def _table(*columns: str, right: int = 0) -> Table:
+    """A plain table; the first `right` columns are numbers."""
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i < right else "left", no_wrap=i == 0)
+    return table
