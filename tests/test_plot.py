@@ -1,0 +1,330 @@
+"""A figure shows the path, the force, the speed and the ledger, and what limits them."""
+
+import dataclasses
+import os
+import warnings
+
+import numpy as np
+import pytest
+
+from dmoc import (
+    BallForce,
+    BoxForce,
+    Conservative,
+    Engine,
+    Fuel,
+    KeepIn,
+    KeepOut,
+    LinearDrag,
+    Nozzles,
+    PointGravity,
+    SpeedLimit,
+    State,
+    Time,
+    TransferProblem,
+    load,
+    solve,
+)
+from dmoc.plot import figure, save_figure
+from dmoc.plot_style import readable, within_steps
+from dmoc.verify import Check, Report
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def line(**changes):
+    parts = {"actuator": BoxForce(1.0), "objective": Time()}
+    return TransferProblem(1, State((0,), (0,)), State((1,), (0,)), (0.1, 10), **(parts | changes))
+
+
+def orbit(**changes):
+    parts = {"effects": [PointGravity(1)]}
+    return TransferProblem(1, State((1, 0), (0, 1)), State((-1.2, 0), (0, -0.9)), 4.0, **(parts | changes))
+
+
+def room(**changes):
+    parts = {
+        "actuator": BallForce(1.2),
+        "constraints": [KeepOut((4, 0), 1.5), KeepIn((-1, -3), (9, np.inf)), SpeedLimit(0.35)],
+        "name": "living_room",
+    }
+    return TransferProblem(10.0, State((0, 0), (0, 0)), State((8, 1), (0, 0)), 40.0, **(parts | changes))
+
+
+def flyer():
+    zones = [KeepOut(center, 1.0) for center in [(2, 0.2, 0.2), (4.2, 0.9, 0.4), (6, 0.4, 1)]]
+    zones.append(KeepIn((-1, -3, -3), (9, 3, 3)))
+    ends = State((0, 0, 0), (0, 0, 0)), State((8, 1, 1), (0, 0, 0))
+    return TransferProblem(10.0, *ends, 40.0, actuator=BoxForce((0.6, 0.6, 0.5)), constraints=zones)
+
+
+CASES = {
+    "1-D held": (line, {"steps": 12, "hold": True}),
+    "1-D": (line, {"steps": 12}),
+    "2-D order 8": (orbit, {"order": 8, "steps": 6}),
+    "2-D held": (room, {"steps": 12, "hold": True}),
+    "3-D": (flyer, {"order": 4, "steps": 12}),
+}
+SOLVED: dict = {}
+
+
+def solved(name):
+    if name not in SOLVED:
+        make, arguments = CASES[name]
+        SOLVED[name] = solve(make(), **arguments)
+    return SOLVED[name]
+
+
+def panels(solution, report=None):
+    page = figure(solution, report)
+    return dict(zip(("path", "force", "speed", "ledger"), page.axes, strict=True))
+
+
+def labels(axes):
+    """What the panel's legend names."""
+    return [text.get_text().replace("\n", " ") for text in axes.get_legend().get_texts()]
+
+
+def levels(axes, label):
+    """Heights of the horizontal lines of that name."""
+    return sorted(
+        artist.get_ydata()[0] for artist in axes.lines if artist.get_label().replace("\n", " ") == label
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("loaded", [False, True])
+def test_every_kind_of_solution_makes_a_picture(name, loaded, tmp_path):
+    solution = solved(name)
+    if loaded:
+        solution.save(tmp_path / "s.nc")
+        solution = load(tmp_path / "s.nc")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save_figure(solution, tmp_path / "s.png")
+    content = (tmp_path / "s.png").read_bytes()
+    assert content.startswith(PNG)
+    assert len(content) > 20_000
+
+
+@pytest.mark.parametrize(("suffix", "start"), [(".pdf", b"%PDF"), (".svg", b"<?xml"), (".PNG", PNG)])
+def test_the_suffix_decides_the_format(tmp_path, suffix, start):
+    path = tmp_path / f"picture{suffix}"
+    save_figure(solved("1-D"), path)
+    assert path.read_bytes().startswith(start)
+
+
+@pytest.mark.parametrize("name", ["picture.bmp", "picture"])
+def test_an_unknown_suffix_is_refused(tmp_path, name):
+    with pytest.raises(ValueError, match=r"must end in \.png, \.pdf, \.svg"):
+        save_figure(solved("1-D"), tmp_path / name)
+    assert not os.listdir(tmp_path)
+
+
+def test_no_half_a_picture_is_left(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    def fail(self, path, **_):
+        path.write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_figure(solved("1-D"), tmp_path / "s.png")
+    assert not os.listdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_all_axes_have_units_and_no_text_is_small(name):
+    for axes in figure(solved(name)).axes:
+        assert axes.get_ylabel().endswith("]")
+        assert not axes.get_xlabel() or axes.get_xlabel().endswith("]")
+        texts = [
+            axes.yaxis.label,
+            *axes.get_xticklabels(),
+            *axes.get_yticklabels(),
+            *axes.get_legend().get_texts(),
+        ]
+        assert min(text.get_fontsize() for text in texts) >= 10
+
+
+@pytest.mark.parametrize("name", ["2-D order 8", "2-D held", "3-D"])
+def test_nothing_overlaps(name):
+    """Panels, titles, legends and the texts of the page keep clear of one another."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    page = figure(solved(name))
+    renderer = FigureCanvasAgg(page).get_renderer()
+    page.draw_without_rendering()
+    time_panels = [axes.get_tightbbox(renderer) for axes in page.axes[1:]]
+    path = page.axes[0].get_tightbbox(renderer)
+    texts = [page._suptitle.get_window_extent(renderer), page._supxlabel.get_window_extent(renderer)]
+    if name == "3-D":
+        texts.append(page.axes[0].zaxis.label.get_window_extent(renderer))
+    for i, box in enumerate(time_panels):
+        assert not box.overlaps(path)
+        assert not any(box.overlaps(other) for other in (*time_panels[:i], *texts))
+
+
+def test_the_path_is_drawn_with_its_ends():
+    solution = solved("2-D order 8")
+    axes = panels(solution)["path"]
+    assert {"path", "start", "goal", "attractor", "step ends"} <= set(labels(axes))
+    marks = {artist.get_label(): artist.get_xydata() for artist in axes.lines}
+    assert marks["start"] == pytest.approx(np.array([[1.0, 0.0]]))
+    assert marks["goal"] == pytest.approx(np.array([[-1.2, 0.0]]))
+    assert marks["attractor"] == pytest.approx(np.array([[0.0, 0.0]]))
+    assert axes.get_aspect() == 1.0
+
+
+def test_a_path_of_high_order_is_smooth_and_goes_through_every_node():
+    solution = solved("2-D order 8")
+    times, path = within_steps(solution, solution.position)
+    assert len(path) > 5 * len(solution.position)
+    assert np.all(np.diff(times) >= 0)
+    turns = np.diff(path, axis=0)
+    turns = turns[np.linalg.norm(turns, axis=1) > 1e-9]
+    directions = np.unwrap(np.arctan2(turns[:, 1], turns[:, 0]))
+    assert np.abs(np.diff(directions)).max() < 0.1
+    from scipy.interpolate import CubicSpline
+
+    once = np.append(np.diff(times) > 0, True)
+    assert CubicSpline(times[once], path[once])(solution.time) == pytest.approx(solution.position, abs=1e-4)
+
+
+def test_at_order_2_the_path_is_the_chords():
+    solution = solved("2-D held")
+    assert np.array_equal(within_steps(solution, solution.position)[1], solution.position)
+
+
+def test_limits_and_zones_are_drawn():
+    solution = solve(room(), steps=12)
+    drawn = panels(solution)
+    assert levels(drawn["force"], "limit") == [1.2]
+    assert levels(drawn["speed"], "limit") == [0.35]
+    disc = next(patch for patch in drawn["path"].patches if patch.get_gid() == "keep-out zone")
+    assert disc.center == (4.0, 0.0) and disc.radius == 1.5
+    assert {"keep-out zone", "keep-in zone"} <= set(labels(drawn["path"]))
+    assert figure(solution).get_suptitle().startswith("living room: least effort")
+
+
+def test_zones_in_space_and_limits_of_each_axis_are_drawn():
+    drawn = panels(solved("3-D"))
+    spheres = [shape for shape in drawn["path"].collections if shape.get_gid() == "keep-out zone"]
+    assert len(spheres) == 3
+    assert {"keep-out zone", "its shadow"} <= set(labels(drawn["path"]))
+    assert levels(drawn["force"], "limit of a component") == [-0.6, -0.5, 0.5, 0.6]
+    assert {"$F_x$", "$F_y$", "$F_z$", "$|F|$"} <= set(labels(drawn["force"]))
+
+
+def test_on_a_line_zones_are_bands():
+    zones = [KeepOut((3.0,), 1.0), KeepIn((-0.5,), (np.inf,))]
+    axes = panels(solve(line(constraints=zones), steps=8))["path"]
+    assert {"keep-out zone", "keep-in zone", "position"} <= set(labels(axes))
+    assert levels(axes, "keep-in zone") == [-0.5]
+    assert axes.get_ylabel() == "x [m]" and axes.get_xlabel() == "time [s]"
+
+
+def test_held_forces_are_steps():
+    from matplotlib.patches import StepPatch
+
+    held = panels(solved("1-D held"))["force"]
+    steps = [patch for patch in held.patches if isinstance(patch, StepPatch)]
+    assert len(steps) == 1
+    assert steps[0].get_data().values == pytest.approx(solved("1-D held").force[:, 0])
+    assert "held" in held.get_title(loc="left")
+    assert not [p for p in panels(solved("1-D"))["force"].patches if isinstance(p, StepPatch)]
+
+
+def test_a_loaded_solution_has_no_zones_until_its_problem_is_attached(tmp_path):
+    solution = solved("2-D held")
+    solution.save(tmp_path / "s.nc")
+    loaded = load(tmp_path / "s.nc")
+    bare, whole = panels(loaded), panels(loaded.attach(room()))
+    assert not bare["path"].patches and "limit" not in labels(bare["force"])
+    assert "problem not attached" in figure(loaded).get_supxlabel()
+    assert "keep-out zone" in labels(whole["path"]) and "limit" in labels(whole["force"])
+
+
+def test_energy_gained_is_the_work_done():
+    for name in ("1-D held", "2-D order 8", "3-D"):
+        axes = panels(solved(name))["ledger"]
+        gained, work = (curve.get_ydata() for curve in axes.lines[:2])
+        assert labels(axes) == ["energy gained", "work of the force"]
+        assert work == pytest.approx(gained, abs=1e-3 * np.abs(gained).max())
+        assert gained[0] == 0.0
+
+
+def test_effects_that_do_work_are_in_the_ledger():
+    axes = panels(solve(room(effects=[LinearDrag(0.5)]), steps=100))["ledger"]
+    curves = {curve.get_label().replace("\n", " "): curve.get_ydata() for curve in axes.lines}
+    assert curves["work of the effects"][-1] < 0
+    assert curves["sum of work"] == pytest.approx(curves["energy gained"], abs=1e-3)
+
+
+@dataclasses.dataclass(frozen=True)
+class Shaken(Conservative):
+    """A uniform field that swings, so that energy is not to be balanced."""
+
+    def lagrangian(self, t, q, v, m):
+        import casadi as ca
+
+        return 0.01 * ca.sin(t) * q[0]
+
+
+def test_where_energy_is_not_kept_momentum_is_shown():
+    solution = solve(room(effects=[Shaken()]), steps=20)
+    assert "Momentum" in panels(solution)["ledger"].get_title(loc="left")
+
+
+def test_without_effects_the_momentum_is_the_impulse():
+    engine = Engine(1.2, exhaust_velocity=100.0, dry_mass=5.0)
+    solution = solve(room(actuator=engine, objective=Fuel(), constraints=()), steps=20, hold=True)
+    axes = panels(solution)["ledger"]
+    curves = {curve.get_label(): curve.get_ydata() for curve in axes.lines}
+    for axis in "xy":
+        assert curves[f"{axis} from force"] == pytest.approx(curves[f"{axis} gained"], abs=1e-3)
+    assert "final mass" in figure(solution).get_suptitle()
+
+
+def test_nozzles_are_limited_one_by_one():
+    nozzles = Nozzles([(1, 0), (-1, 0), (0, 1), (0, -1)], 1.5)
+    solution = solve(room(actuator=nozzles, constraints=()), steps=10)
+    assert levels(panels(solution)["force"], "limit of a nozzle") == [1.5]
+
+
+def test_the_page_tells_what_failed():
+    failed = solve(
+        TransferProblem(1.0, State((0,), (0,)), State((1,), (0,)), 0.1, actuator=BoxForce(1.0)), steps=8
+    )
+    page = figure(failed)
+    assert "NOT SOLVED (infeasible)" in page.get_suptitle()
+    checks = [Check("residual", 2.0, 1.0, "N", False), Check("bounds", 0.0, 1.0, "m", True)]
+    assert "checks failed: residual" in figure(failed, Report(tuple(checks), 0.1)).get_supxlabel()
+    good = Report((Check("residual", 0.5, 1.0, "N", True),), 0.1)
+    assert "all 1 checks hold" in figure(solved("1-D"), good).get_supxlabel()
+
+
+def test_far_walls_and_large_zones_do_not_hide_the_path():
+    zones = [KeepOut((4, -1000.0), 999.0), KeepIn((-1e4, -1e4), (1e4, 1e4))]
+    page = figure(solve(room(constraints=zones), steps=12))
+    page.draw_without_rendering()
+    left, right = page.axes[0].get_xlim()
+    assert right - left < 40
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "expected"),
+    [
+        (7e6, "m", (1e3, "km")),
+        (8.0, "m", (1.0, "m")),
+        (7500.0, "m/s", (1.0, "m/s")),
+        (2e-4, "N", (1e-3, "mN")),
+        (2e5, "s", (3600.0, "h")),
+        (9e6, "s", (86400.0, "days")),
+        (0.0, "J", (1.0, "J")),
+        (np.nan, "m", (1.0, "m")),
+    ],
+)
+def test_units_read_well(value, unit, expected):
+    assert readable(np.array([0.0, -value]), unit) == expected
