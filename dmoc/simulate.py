@@ -1,29 +1,32 @@
-"""Forward integration of the same scheme, and an independent integrator for reference."""
+"""Forward integration of the same scheme."""
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.checks import number
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map, step_momenta
 from dmoc.mesh import Guess, node_fractions, step_nodes, uniform_mesh
 from dmoc.problem import TransferProblem
+from dmoc.reference import reference as reference
 
 
-def end_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[np.ndarray, np.ndarray]:
+def end_momenta(
+    dynamics: Dynamics, path: Guess, start_time: float, momenta: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
 
     The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
-    end what arrives there.
+    end what arrives there. `momenta` are the `legendre_momenta` if they are known.
     """
     n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
-    momenta = legendre_momenta(dynamics, path, start_time)
+    if momenta is None:
+        momenta = legendre_momenta(dynamics, path, start_time)
     p = np.concatenate([-momenta[0], momenta[-1][-1:]])
     times = start_time + path.duration * path.mesh
     v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
@@ -132,17 +135,13 @@ def simulate(
         raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
     path = getattr(controls, "path", None)
     if path is None:
-        mesh = uniform_mesh(400 if steps is None else int(steps))
-        nodes = len(node_fractions(mesh, scheme(order)))
-        shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
-        given = np.zeros(shape) if controls is None else np.asarray(controls, float)
-        if given.shape != shape:
-            raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
-        longest = problem.duration_bounds[1] if duration is None else duration
-        mass = np.full(nodes, problem.mass)
-        path = Guess(
-            mesh, order, hold, float(longest), np.tile(position, (nodes, 1)), given, mass, velocity, velocity
-        )
+        path = _given_path(problem, controls, steps, order, hold, duration)
+    elif path.position.shape[1:] + path.control.shape[1:] != (
+        problem.dimension,
+        problem.actuator.size(problem.dimension),
+    ):
+        raise ValueError("the solution has another dimension or other controls than the problem")
+    path = replace(path, mass=node_masses(dynamics, path, problem.mass))
     time = problem.start_time + path.duration * path.mesh
     mass = path.mass[:: scheme(path.order).degree]
     momentum = dynamics.point(time[0], position, velocity, mass[0])[1]
@@ -150,6 +149,49 @@ def simulate(
     v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
     energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
     return Trajectory(time, q, v, p, mass, energy)
+
+
+def _given_path(
+    problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
+) -> Guess:
+    """Controls on a mesh, checked, as a path that stays at the start."""
+    if steps is not None and (isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1):
+        raise ValueError(f"steps must be a whole number of at least 1; got {steps!r}")
+    mesh = uniform_mesh(400 if steps is None else int(steps))
+    nodes = len(node_fractions(mesh, scheme(order)))
+    shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
+    given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+    if given.shape != shape:
+        raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(
+            f"controls must be finite; row {int(np.argmin(np.isfinite(given).all(axis=1)))} is not"
+        )
+    longest = (
+        problem.duration_bounds[1] if duration is None else number("duration", duration, "s", positive=True)
+    )
+    position, velocity = problem.start.fixed()
+    mass = np.full(nodes, problem.mass)
+    return Guess(mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity)
+
+
+def node_masses(dynamics: Dynamics, path: Guess, mass: float) -> np.ndarray:
+    """Masses of the nodes [kg], shape (nodes,), from that at the start and the controls of a path.
+
+    m_i = m_0 - h sum_j A_ij flow_j with the Lobatto IIIA matrix A, as in the transcription.
+    """
+    rule, at = scheme(path.order), step_nodes(len(path.mesh) - 1, scheme(path.order))
+    masses = np.full(at[-1, -1] + 1, float(mass))
+    if not dynamics.actuator.burns:
+        return masses
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    flow = ca.Function("flow", [u], [ca.densify(dynamics.actuator.flow(u))])(path.control.T).full().ravel()
+    h = path.duration * np.diff(path.mesh)
+    burnt = h * (rule.integral @ (np.tile(flow, (rule.degree + 1, 1)) if path.hold else flow[at]))
+    before = np.concatenate([[0.0], np.cumsum(burnt[-1])])
+    masses[at] -= before[:-1] + burnt
+    masses[-1] = mass - before[-1]
+    return masses
 
 
 def rollout(
@@ -194,74 +236,8 @@ def _advance(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[list, 
     return [state, *given], state + ca.vertcat(*increments[:2]), inputs
 
 
-def reference(
-    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m] and velocity [m/s] at the goal by SciPy's DOP853, from the start with the path's controls.
-
-    The control is the polynomial through each step's Lobatto nodes, with hold the held value; the
-    integrator restarts where it jumps.
-    """
-    from scipy.integrate import solve_ivp
-
-    n, ends = dynamics.dimension, path.duration * path.mesh
-    motion = _Motion(dynamics, path, start_time)
-    force = force_of(dynamics, path.control)
-    if path.hold:
-        arcs: list = [(ends[k], ends[k + 1], lambda t, k=k: force[k]) for k in range(len(ends) - 1)]
-    else:
-        arcs = [(ends[0], ends[-1], _interpolant(force, ends, path.order))]
-    extent = np.ptp(path.position, axis=0).max() or 1.0
-    scale = np.repeat([extent, max(extent / path.duration, np.abs(velocity).max())], n)
-    # no long strides: an arc of coast must not step over a short thrust
-    settings = {"rtol": 1e-11, "atol": 1e-12 * scale, "max_step": path.duration / 40}
-    state = np.concatenate([path.position[0], velocity])
-    for begin, end, control in arcs:
-        run = solve_ivp(motion, (begin, end), state, "DOP853", args=(control,), **settings)
-        state = run.y[:, -1]
-    return state[:n], state[n:]
-
-
 def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
     """Force [N] of controls, one row each."""
     u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
     force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
     return np.array(force(control.T)).T.reshape(len(control), dynamics.dimension)
-
-
-def _interpolant(force: np.ndarray, ends: np.ndarray, order: int) -> Callable[[float], np.ndarray]:
-    """The force as a function of time: one polynomial a step, in powers of the fraction of the step."""
-    rule = scheme(order)
-    nodes = force[step_nodes(len(ends) - 1, rule)]
-    to_powers = np.linalg.inv(np.vander(rule.points, increasing=True))
-    coefficients = np.einsum("pj,jkn->kpn", to_powers, nodes)
-    exponents = np.arange(rule.degree + 1)
-    ends_list, last = ends.tolist(), len(ends) - 2
-
-    def control(t: float) -> np.ndarray:
-        k = min(max(bisect_right(ends_list, t) - 1, 0), last)
-        return ((t - ends_list[k]) / (ends_list[k + 1] - ends_list[k])) ** exponents @ coefficients[k]
-
-    return control
-
-
-class _Motion:
-    """d(q, v)/dt as a function of time, state and a control function, through CasADi's buffers (no copies)."""
-
-    def __init__(self, dynamics: Dynamics, path: Guess, start_time: float):
-        n = self.axes = dynamics.dimension
-        self.start_time, self.rate = start_time, np.zeros(n)
-        # the buffer holds bare addresses: everything it points to lives as long as this object
-        self.arguments = np.zeros(1), np.zeros(n), np.zeros(n), path.mass[:1].copy(), np.zeros(n)
-        self.function = dynamics.acceleration
-        self.buffer, self.evaluate = self.function.buffer()
-        for i, argument in enumerate(self.arguments):
-            self.buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type]
-        self.buffer.set_res(0, memoryview(self.rate))  # type: ignore[arg-type]
-
-    def __call__(self, t: float, state: np.ndarray, control: Callable[[float], np.ndarray]) -> np.ndarray:
-        time, position, velocity, _, push = self.arguments
-        time[0], push[:] = self.start_time + t, control(t)
-        position[:], velocity[:] = state[: self.axes], state[self.axes :]
-        self.evaluate()
-        return np.concatenate([velocity, self.rate])
