@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -99,15 +101,16 @@ def solve(
 
     _writable(out)
     _writable(plot, drawn=True)
-    file, case = _problem(problem, settings)
-    start = None if guess is None else dmoc.load(guess)
-    with report.live_line(not (as_json or quiet), case.objective.unit_with(case.actuator)) as progress:
-        solution = dmoc.solve(
-            case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
-        )
-    _raise_if_interrupted()
-    verdict = verify(solution) if solution.success else None
-    _raise_if_interrupted()
+    # what a problem file prints must not come between the lines of the JSON object
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
+        file, case = _problem(problem, settings)
+        start = None if guess is None else dmoc.load(guess)
+        unit = case.objective.unit_with(case.actuator)
+        with report.live_line(not (as_json or quiet), unit) as progress:
+            solution = dmoc.solve(
+                case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
+            )
+        verdict = verify(solution) if solution.success else None
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
     if plot is not None:
@@ -130,13 +133,16 @@ def march(
     import dmoc
     from dmoc import report
     from dmoc.simulate import simulate
+    from dmoc.transcription import check_mesh
 
+    if steps is not None:
+        check_mesh(steps)
     if controls is not None and (order, steps, hold) != (None, None, False):
         raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
     _, case = _problem(problem, settings)
     known = None if controls is None else dmoc.load(controls).attach(case)
-    trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
-    _raise_if_interrupted()
+    with _ends_at_once():
+        trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
     report.console().print(report.motion(trajectory, case, coast=known is None))
 
 
@@ -145,9 +151,9 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.verify import verify
 
-    solution = _attached(file, problem)
-    verdict = verify(solution)
-    _raise_if_interrupted()
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
+        solution = _attached(file, problem)
+        verdict = verify(solution)
     _show(solution, verdict, as_json, quiet=False, written=[])
 
 
@@ -176,16 +182,15 @@ def plot(
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; every bad input becomes one line on stderr and exit code 2."""
-    given = sys.argv[1:] if arguments is None else arguments
-    signal.signal(signal.SIGINT, _interrupt)
+    given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = app(args=given or ["--help"], standalone_mode=False) or SOLVED
+        code = app(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
         _fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
-    except (KeyboardInterrupt, typer.Abort):
-        code = INTERRUPTED
     except (ValueError, OSError) as error:
         _fail(f"error: {error}", BAD_INPUT)
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
     if code == INTERRUPTED:
         _fail("interrupted", INTERRUPTED)
     sys.exit(code)
@@ -271,15 +276,28 @@ def _fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-_interrupts: list[int] = []
+@contextmanager
+def _ends_at_once() -> Iterator[None]:
+    """CasADi swallows a KeyboardInterrupt inside a solve and the solve goes on: here it ends the program.
+
+    Nothing is being written here, so nothing is left behind.
+    """
+
+    def end(number: int, frame: Any) -> NoReturn:
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[2K\x1b[?25h")
+        sys.stderr.write("interrupted\n")
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
+
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
-def _interrupt(number: int, frame: Any) -> None:
-    # CasADi swallows a KeyboardInterrupt inside a solve, so it is also written down
-    _interrupts.append(number)
-    raise KeyboardInterrupt
-
-
-def _raise_if_interrupted() -> None:
-    if _interrupts:
-        raise KeyboardInterrupt
+if __name__ == "__main__":
+    main()

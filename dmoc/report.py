@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dmoc.verify import Report
 
 # Width of what is written to a file or a pipe, where no terminal gives one.
-PLAIN_WIDTH = 110
+PLAIN_WIDTH = 120
 # The live line is redrawn at most this often [s]: drawing must not slow the solve down.
 REDRAW = 0.1
 
@@ -97,13 +97,13 @@ def parameters(entries: Sequence[Parameter]) -> RenderableType:
     return table
 
 
-def sizes(nlp: NLP) -> str:
-    """The size of the NLP, in one line."""
+def sizes(nlp: NLP) -> RenderableType:
+    """The size of the NLP."""
     jacobian, hessian = nlp.assembly.jacobian.nnz_out(1), nlp.assembly.hessian.nnz_out(0)
-    return (
-        f"{nlp.columns.size} unknowns, {nlp.rows.size} rows, {jacobian} nonzeros in the Jacobian and {hessian} "
-        f"in the Hessian's upper triangle (order {nlp.scheme.order}, {len(nlp.mesh) - 1} steps)"
-    )
+    mesh = f"order {nlp.scheme.order}, {len(nlp.mesh) - 1} steps"
+    counts = f"{nlp.columns.size} unknowns, {nlp.rows.size} rows"
+    entries = f"nonzeros: {jacobian} in the Jacobian, {hessian} in the Hessian's upper triangle"
+    return _pairs([("NLP", [f"{counts} ({mesh})", entries])])
 
 
 def ladder(solution: Solution) -> RenderableType:
@@ -139,10 +139,7 @@ def answer(
 ) -> RenderableType:
     """What a solve that succeeded shows: ladder, checks, files, and one line that sums it up."""
     total = solution.build_s + solution.solve_s + report.seconds
-    found = (
-        f"Solved: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
-        "A local optimum: another guess may lead to a better one. "
-    )
+    found = f"Solved, a local optimum: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
     broken = ", ".join(check.name for check in report.checks if not check.ok)
     last = Text(found, "yellow" if broken else "green")
     last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
