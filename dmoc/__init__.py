@@ -13,8 +13,8 @@ __version__ = "0.1.0"
 # Imported on first use, so that `dmoc --help` answers before CasADi is loaded.
 _HOMES = {
     "dmoc.actuators": ("Actuator", "BallForce", "BoxForce", "FreeForce"),
-    "dmoc.boundary": ("Boundary", "State"),
-    "dmoc.constraints": ("Constraint", "KeepIn", "KeepOut", "SpeedLimit"),
+    "dmoc.boundary": ("Boundary", "Condition", "Moving", "State"),
+    "dmoc.constraints": ("ApproachCone", "Constraint", "KeepIn", "KeepOut", "SpeedLimit"),
     "dmoc.effects": (
         "ClohessyWiltshire",
         "Conservative",
@@ -28,7 +28,17 @@ _HOMES = {
         "three_body",
     ),
     "dmoc.engines": ("Engine", "Nozzles"),
-    "dmoc.objectives": ("Effort", "Fuel", "Objective", "Time"),
+    "dmoc.objectives": (
+        "Effort",
+        "FinalHeight",
+        "FinalMass",
+        "FinalRadius",
+        "Fuel",
+        "Objective",
+        "Time",
+        "WeightedSum",
+    ),
+    "dmoc.orbits": ("CircularOrbit", "Orbit"),
     "dmoc.problem": ("TransferProblem",),
     "dmoc.rows": ("Row",),
     "dmoc.simulate": ("Trajectory", "simulate"),

@@ -177,11 +177,11 @@ class Transcript:
             local.limit(f"{end}.condition", "end", condition.rows(*states[end]))
             rows = [row for constraint in self.constraints for row in constraint.speed_rows(v[end])]
             local.limit(f"{end}.speed", "end", rows)
-        local.cost = ca.SX(self.objective.terminal(*states["goal"]))
+        local.cost = self.objective.sense * ca.SX(self.objective.terminal(*states["goal"]))
         return local.block("ends")
 
     def _rate(self, *state) -> Any:
-        return self.objective.rate(self.actuator, *state)
+        return self.objective.sense * self.objective.rate(self.actuator, *state)
 
     def _cost_in_steps(self) -> bool:
         """Whether the running cost looks at the velocity or at a held control."""
@@ -235,6 +235,8 @@ class _Local:
     def limit(self, name: str, kind: str, rows: Sequence[Row]) -> None:
         """Rows of this block alone."""
         if rows:
+            units = self.transcript.units
+            rows = [row.scaled(units.length, units.time) for row in rows]
             group = self.transcript._add_rows(name, kind, rows, self.count)
             self.add(group, ca.vertcat(*[row.expression for row in rows]))
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
-from dmoc.checks import same_length, vector
+from dmoc.checks import number, same_length, vector
 from dmoc.rows import Row
 
 
@@ -20,7 +23,16 @@ class Boundary(ABC):
     @property
     @abstractmethod
     def dimension(self) -> int:
-        """Number of axes."""
+        """Number of axes; 0 where the other end decides."""
+
+    @property
+    def structure(self) -> tuple:
+        """What cannot change in a re-solve: two boundaries with the same structure have the same rows."""
+        return (type(self),)
+
+    def with_dimension(self, dimension: int) -> Boundary:
+        """The same boundary, with the number of axes filled in where it was left open."""
+        return self
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         """Position [m] and velocity [m/s] entries that are fixed numbers; NaN where they are not."""
@@ -28,12 +40,20 @@ class Boundary(ABC):
         return free, free.copy()
 
     def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
-        """Further conditions, dimensionless."""
+        """Further conditions, each independent of the others and of what is fixed."""
         return []
 
-    def estimate(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """A typical position and velocity for the starting guess; NaN where nothing is known."""
+    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """A position and velocity for the starting guess; NaN where nothing is known.
+
+        `near` is a position and velocity to be close to: what the other end coasts to.
+        """
         return self.fixed()
+
+    @property
+    def anchored(self) -> bool:
+        """Whether the estimate of the position stands by itself, without the other end."""
+        return not np.isnan(self.fixed()[0]).any()
 
     @abstractmethod
     def words(self) -> str:
@@ -76,6 +96,166 @@ class State(Boundary):
 
     def words(self) -> str:
         return f"position {_entries(self.position)} m, velocity {_entries(self.velocity)} m/s"
+
+
+@dataclass(frozen=True)
+class Moving(Boundary):
+    """A state that moves: the body meets it at whatever time the transfer starts or ends.
+
+    Parameters
+    ----------
+    position : callable
+        Function of the time [s], a CasADi symbol, that gives the position [m], one entry an axis.
+    velocity : callable, "matched" or None
+        Function of the time that gives the velocity [m/s]; "matched" is the derivative of the
+        position, None leaves the velocity free (an interception).
+    """
+
+    position: Callable
+    velocity: Callable | str | None = "matched"
+
+    def __post_init__(self) -> None:
+        if not callable(self.position):
+            raise ValueError(
+                f"Moving: position must be a function of the time [s]; got {self.position!r}; "
+                "use State(position, velocity) for what does not move"
+            )
+        if not (callable(self.velocity) or self.velocity in ("matched", None)):
+            raise ValueError(
+                f"Moving: velocity must be a function of the time [s], 'matched' or None; got {self.velocity!r}"
+            )
+        sizes = [self._motion.numel_out(i) for i in range(self._motion.n_out())]
+        if not 1 <= sizes[0] <= 3 or len(set(sizes)) > 1:
+            raise ValueError(
+                "Moving: position and velocity must have the same 1 to 3 entries; "
+                f"got {sizes[0]} and {sizes[-1]}"
+            )
+
+    @cached_property
+    def _motion(self) -> ca.Function:
+        """t -> position [m] and, unless it is free, velocity [m/s]."""
+        t = ca.SX.sym("t")
+        position = _column(self.position(t))
+        if self.velocity is None:
+            return ca.Function("motion", [t], [position])
+        moving = _column(self.velocity(t)) if callable(self.velocity) else ca.jacobian(position, t)
+        return ca.Function("motion", [t], [position, ca.densify(moving)])
+
+    @property
+    def dimension(self) -> int:
+        return self._motion.numel_out(0)
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.position, self.velocity
+
+    @property
+    def anchored(self) -> bool:
+        return True
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        rows = []
+        for have, want, name, unit in zip(
+            (q, v), self._motion.call([t]), ("position", "velocity"), ("m", "m/s"), strict=False
+        ):
+            for i, axis in enumerate("xyz"[: self.dimension]):
+                rows.append(Row(f"{name}.{axis}", have[i] - want[i], 0.0, 0.0, unit))
+        return rows
+
+    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+        position, *velocity = (np.array(ca.DM(value)).ravel() for value in self._motion.call([t]))
+        return position, velocity[0] if velocity else np.full(self.dimension, np.nan)
+
+    def words(self) -> str:
+        where = ", ".join(f"{value:.4g}" for value in self.estimate(0.0)[0])
+        velocity = "any velocity" if self.velocity is None else "its velocity"
+        return f"a point that moves, at ({where}) m at 0 s, with {velocity}"
+
+
+@dataclass(frozen=True)
+class Condition(Boundary):
+    """Any condition: function(t, q, v, m) = 0, beside what a State fixes.
+
+    Parameters
+    ----------
+    function : callable
+        (t [s], q [m], v [m/s], m [kg]) -> a CasADi expression or a list of them, each zero where the
+        condition holds. They must be independent of each other and of what `state` fixes.
+    name : str
+        What the rows are called, such as "circular".
+    scale : float or sequence of float
+        Typical size of each value, in its own unit.
+    state : State, optional
+        Entries of position and velocity that are fixed; none if not given.
+    """
+
+    function: Callable
+    name: str = "condition"
+    scale: float | tuple = 1.0
+    state: State | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ValueError(f"Condition: function must be a function (t, q, v, m); got {self.function!r}")
+        if not isinstance(self.name, str) or not self.name:
+            raise ValueError(f"Condition: name must be a word; got {self.name!r}")
+        scale = self.scale
+        if np.ndim(scale) == 0:
+            checked: Any = number("scale", scale, "unit of the condition", positive=True)
+        else:
+            checked = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scale))  # type: ignore[arg-type]
+        object.__setattr__(self, "scale", checked)
+        if self.state is not None:
+            if not isinstance(self.state, State):
+                raise ValueError(f"Condition: state must be a dmoc.State; got {self.state!r}")
+            self._check_values()
+
+    @property
+    def dimension(self) -> int:
+        return 0 if self.state is None else self.state.dimension
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.function, self.name, self.scale
+
+    def with_dimension(self, dimension: int) -> Condition:
+        free = (None,) * dimension
+        return replace(self, state=State(free, free)) if self.state is None else self
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        return super().fixed() if self.state is None else self.state.fixed()
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        values = _column(self.function(t, q, v, m))
+        count = values.numel()
+        names = [self.name] if count == 1 else [f"{self.name}_{i + 1}" for i in range(count)]
+        scales = np.broadcast_to(self.scale, (count,))
+        return [Row(names[i], values[i] / float(scales[i]), 0.0, 0.0) for i in range(count)]
+
+    def _check_values(self) -> None:
+        n = self.dimension
+        given = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
+        count = _column(self.function(*given)).numel()
+        if isinstance(self.scale, tuple) and len(self.scale) != count:
+            raise ValueError(
+                f"Condition {self.name!r}: scale has {len(self.scale)} entries but the function gives {count} "
+                f"values; give one number or {count}"
+            )
+
+    def words(self) -> str:
+        condition = f"the condition {self.name!r}"
+        if self.state is None or np.isnan(self.state.fixed()).all():
+            return condition
+        return f"{self.state.words()}, {condition}"
+
+
+def _column(value: Any) -> Any:
+    """A CasADi column from what a user's function gave."""
+    if isinstance(value, (ca.SX, ca.MX, ca.DM)):
+        return ca.vec(value)
+    if isinstance(value, np.ndarray):
+        value = value.ravel().tolist()
+    return ca.SX(ca.vertcat(*value)) if isinstance(value, (list, tuple)) else ca.SX(value)
 
 
 def _entries(values: Any) -> str:

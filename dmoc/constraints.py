@@ -144,6 +144,71 @@ class SpeedLimit(Constraint):
         return f"is never faster than {self.limit:g} m/s"
 
 
+@dataclass(frozen=True)
+class ApproachCone(Constraint):
+    """Stay inside a cone: axis . d >= cos(half_angle) |d| with d the position from the apex.
+
+    In the plane these are two straight lines. In space |d| is rounded over `rounding` at the apex,
+    where it has no derivative; the apex itself is allowed.
+
+    Parameters
+    ----------
+    apex : sequence of float
+        Tip of the cone [m].
+    axis : sequence of float
+        Direction from the tip into the cone [-]; made a unit vector.
+    half_angle : float
+        Between the axis and the surface [rad], less than pi/2.
+    rounding : float
+        [m].
+    """
+
+    apex: tuple
+    axis: tuple
+    half_angle: float
+    rounding: float = 1e-6
+    adjustable: ClassVar[tuple[str, ...]] = ("apex", "axis", "half_angle", "rounding")
+
+    def __post_init__(self) -> None:
+        apex, axis = vector("apex", self.apex, "m"), vector("axis", self.axis, "-")
+        same_length("ApproachCone", apex=apex, axis=axis)
+        length = float(np.linalg.norm(axis))
+        if len(axis) == 1 or length == 0:
+            raise ValueError(f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {self.axis!r}")
+        half_angle = number("half_angle", self.half_angle, "rad", positive=True)
+        if half_angle >= np.pi / 2:
+            raise ValueError(f"ApproachCone: half_angle must be less than pi/2 rad; got {half_angle:g}")
+        object.__setattr__(self, "apex", apex)
+        object.__setattr__(self, "axis", tuple(x / length for x in axis))
+        object.__setattr__(self, "half_angle", half_angle)
+        object.__setattr__(self, "rounding", number("rounding", self.rounding, "m", positive=True))
+
+    def check_dimension(self, dimension: int) -> None:
+        _need(self, "apex", len(self.apex), dimension)
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        offset = q - self.apex
+        depth = ca.dot(offset, self.axis)
+        cos, sin = ca.cos(self.half_angle), ca.sin(self.half_angle)
+        if q.shape[0] == 2:
+            side = cos * ca.det(ca.horzcat(ca.vertcat(self.axis[0], self.axis[1]), offset))
+            lines = {"left": sin * depth - side, "right": sin * depth + side}
+            return [Row(name, inward, 0.0, np.inf, "m") for name, inward in lines.items()]
+        distance = ca.sqrt(ca.dot(offset, offset) + self.rounding**2) - self.rounding
+        return [Row("cone", depth - cos * distance, 0.0, np.inf, "m")]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        offset = q - np.asarray(self.apex)
+        depth = offset @ np.asarray(self.axis)
+        aside = np.linalg.norm(offset - depth[:, None] * np.asarray(self.axis), axis=1)
+        beyond = np.arctan2(aside, depth) - self.half_angle
+        return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
+
+    def words(self) -> str:
+        angle = np.degrees(self.half_angle)
+        return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {self.axis}"
+
+
 def _need(part: Any, argument: str, given: int, dimension: int) -> None:
     if given != dimension:
         raise ValueError(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.boundary import Boundary
 from dmoc.effects.frames import RotatingFrame
 from dmoc.effects.gravity import PointGravity
 from dmoc.lobatto import scheme
@@ -90,12 +91,63 @@ def _given_path(problem: TransferProblem, given: Any, duration: float, fractions
 
 def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
     """Start position and velocity, goal position and velocity, with likely values for what is free."""
-    q0, v0 = (value.copy() for value in problem.start.estimate(problem.start_time))
-    q1, v1 = (value.copy() for value in problem.goal.estimate(problem.start_time + duration))
+    (q0, v0), (q1, v1) = _estimates(problem, duration)
     q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1), q0)
     q1 = np.where(np.isnan(q1), q0, q1)
     mean = (q1 - q0) / duration
     return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
+
+
+def _estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position and velocity of start and goal; near an attractor an open end is where the other one coasts."""
+    ends, times = (problem.start, problem.goal), (0.0, duration)
+    states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
+    whole = [not np.isnan(state).any() for state in states]
+    settled = [end.anchored and known for end, known in zip(ends, whole, strict=True)]
+    attractors = [effect for effect in problem.effects if isinstance(effect, PointGravity)]
+    if attractors and any(whole) and not all(settled):
+        known = (settled if any(settled) else whole).index(True)
+        open_end = 1 - known
+        states[open_end] = _carried(problem, states[known], times[known], ends[open_end], times[open_end])
+    return states
+
+
+def _carried(problem: TransferProblem, state: tuple, begin: float, end: Boundary, finish: float) -> tuple:
+    """A state at an open end, reached by coasting there from the known end.
+
+    Onto an orbit: half the time on the one, half on the other, which is the mean of the angles that
+    the two sweep.
+    """
+    middle = 0.5 * (begin + finish)
+    state = _drift(problem, begin, middle, state)
+    likely = end.estimate(problem.start_time + middle, state)
+    if not (end.anchored or np.isnan(likely).any()):
+        state = likely
+    state = _drift(problem, middle, finish, state)
+    position, velocity = end.estimate(problem.start_time + finish, state)
+    if end.anchored:
+        state = (position, _turned(problem, state, position))
+    return tuple(np.where(np.isnan(at), here, at) for at, here in zip((position, velocity), state, strict=True))
+
+
+def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
+    """A state some time later, or earlier, without thrust."""
+    return tuple(np.split(_coast(problem, begin, finish, *state).y[:, -1], 2))
+
+
+def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:
+    """The velocity of a state as it would be at another place around the first attractor."""
+    q, v = state
+    attractor = next(effect for effect in problem.effects if isinstance(effect, PointGravity))
+    center = np.zeros(len(q)) if attractor.center is None else np.array(attractor.center)
+    q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
+    up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
+    turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
+    return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]
+
+
+def _unit(x: np.ndarray) -> np.ndarray:
+    return x / (np.linalg.norm(x) or 1.0)
 
 
 def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:

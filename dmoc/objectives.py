@@ -1,4 +1,4 @@
-"""What is minimised."""
+"""What is minimised or maximised."""
 
 from __future__ import annotations
 
@@ -9,17 +9,49 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from dmoc.actuators import Actuator
+from dmoc.checks import number, vector
 
 
 class Objective(ABC):
     """The integral of `running` over time plus `terminal` at the goal.
 
     A user's own objective overrides either. `u` are the controls, for a force actuator the force [N].
+    Objectives add up: `0.5 * Effort() + 2 * Time()`; one that is maximised is taken away from one
+    that is minimised: `Effort() - 3 * FinalMass()`.
+
+    Attributes
+    ----------
+    unit : str
+    sense : int
+        1 if it is minimised, -1 if it is maximised. Its value is reported with its own sign either
+        way; multipliers are those of the minimisation of `sense` times the objective.
+    metered : bool
+        Whether it needs the magnitude of the force among the controls.
     """
 
     unit: ClassVar[str] = ""
+    sense: ClassVar[int] = 1
     metered: ClassVar[bool] = False
     adjustable: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def terms(self) -> tuple[tuple[float, Objective], ...]:
+        """The objectives this one is the sum of, each with its weight."""
+        return ((1.0, self),)
+
+    def __mul__(self, weight: float) -> WeightedSum:
+        return WeightedSum(tuple((number("weight", weight, "") * w, term) for w, term in self.terms))
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: Objective) -> WeightedSum:
+        return WeightedSum((*self.terms, *other.terms))
+
+    def __sub__(self, other: Objective) -> WeightedSum:
+        return WeightedSum((*self.terms, *(-1.0 * other).terms))
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the objective has no meaning in this many dimensions."""
 
     def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         """Cost per second."""
@@ -75,3 +107,122 @@ class Time(Objective):
 
     def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         return 1.0
+
+
+@dataclass(frozen=True)
+class FinalMass(Objective):
+    """Largest final mass [kg]. Needs an actuator that burns propellant."""
+
+    unit: ClassVar[str] = "kg"
+    sense: ClassVar[int] = -1
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return m
+
+
+@dataclass(frozen=True)
+class FinalRadius(Objective):
+    """Largest distance from a centre at the goal [m].
+
+    Parameters
+    ----------
+    center : sequence of float, optional
+        [m]; the origin if not given.
+    """
+
+    center: tuple | None = None
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+
+    def __post_init__(self) -> None:
+        if self.center is not None:
+            object.__setattr__(self, "center", vector("center", self.center, "m"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.center is not None and len(self.center) != dimension:
+            raise ValueError(
+                f"FinalRadius: center has {len(self.center)} entries but the problem has {dimension} dimensions"
+            )
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        offset = q if self.center is None else q - ca.DM(self.center)
+        return ca.sqrt(ca.dot(offset, offset))
+
+
+@dataclass(frozen=True)
+class FinalHeight(Objective):
+    """Largest coordinate along one axis at the goal [m].
+
+    Parameters
+    ----------
+    axis : int
+        Which one, counted from 0; the last if not given.
+    """
+
+    axis: int = -1
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+
+    def check_dimension(self, dimension: int) -> None:
+        if isinstance(self.axis, bool) or self.axis not in range(-dimension, dimension):
+            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {self.axis!r}")
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return q[self.axis]
+
+
+@dataclass(frozen=True)
+class WeightedSum(Objective):
+    """A sum of objectives with weights; made by adding objectives and multiplying them by numbers.
+
+    Parameters
+    ----------
+    parts : tuple of (float, Objective)
+        Weights and objectives. All must pull the same way: what is maximised needs the opposite sign
+        of what is minimised.
+    """
+
+    parts: tuple[tuple[float, Objective], ...]
+
+    def __post_init__(self) -> None:
+        pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
+        if len(pulls) != 1:
+            raise ValueError(
+                f"the sum {self.formula} does not say what to do: subtract what is maximised from what is "
+                "minimised, as in Effort() - 2 * FinalMass(), and give at least one weight that is not 0"
+            )
+
+    @property
+    def terms(self) -> tuple[tuple[float, Objective], ...]:
+        return self.parts
+
+    @property
+    def sense(self) -> int:  # type: ignore[override]
+        return 1 if any(weight * term.sense > 0 for weight, term in self.parts) else -1
+
+    @property
+    def metered(self) -> bool:  # type: ignore[override]
+        return any(term.metered for _, term in self.parts)
+
+    @property
+    def formula(self) -> str:
+        """Such as `0.5 Effort + 2 Time`."""
+        words = [f"{'-' if w < 0 else '+'} {abs(w):g} {type(term).__name__}" for w, term in self.parts]
+        return " ".join(words).removeprefix("+ ")
+
+    def check_dimension(self, dimension: int) -> None:
+        for _, term in self.parts:
+            term.check_dimension(dimension)
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return sum(weight * term.rate(actuator, t, q, v, u, m) for weight, term in self.parts if weight)
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return sum(weight * term.terminal(t, q, v, m) for weight, term in self.parts if weight)
+
+    def unit_with(self, actuator: Actuator) -> str:
+        units = {term.unit_with(actuator) for weight, term in self.parts if weight}
+        return units.pop() if len(units) == 1 else ""
+
+    def words(self) -> str:
+        return ("Least " if self.sense > 0 else "Largest ") + self.formula

@@ -13,7 +13,7 @@ from dmoc.boundary import Boundary
 from dmoc.checks import number
 from dmoc.constraints import Constraint
 from dmoc.effects.base import Effect
-from dmoc.objectives import Effort, Objective, Time
+from dmoc.objectives import Effort, FinalMass, Objective, Time
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,15 @@ class TransferProblem:
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
         if self.objective.metered:
             object.__setattr__(self, "actuator", self.actuator.metered())
+        self._complete_ends()
         if self.start.dimension != self.goal.dimension:
             raise ValueError(
                 f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
             )
-        parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator)
+        parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
         for part in parts:
             part.check_dimension(self.dimension)
-        self._check_least_time()
+        self._check_objective()
         self._check_ends()
         if self.actuator.dry_mass >= self.mass:
             raise ValueError(
@@ -114,6 +115,17 @@ class TransferProblem:
         """Shortest and longest duration [s]; equal if it is fixed."""
         return self.duration if isinstance(self.duration, tuple) else (self.duration, self.duration)
 
+    def _complete_ends(self) -> None:
+        """An end that works in any number of axes takes it from the other end."""
+        dimension = self.start.dimension or self.goal.dimension
+        if not dimension:
+            raise ValueError(
+                "neither start nor goal says how many axes there are; give one of them a center, "
+                "for example center=(0, 0)"
+            )
+        for end in ("start", "goal"):
+            object.__setattr__(self, end, getattr(self, end).with_dimension(dimension))
+
     def _check_ends(self) -> None:
         """A boundary state that breaks a constraint can never be met, whatever the path."""
         for end in ("start", "goal"):
@@ -130,8 +142,14 @@ class TransferProblem:
                         f"the body {constraint.words()}; move the {end} or the constraint"
                     )
 
-    def _check_least_time(self) -> None:
-        if not isinstance(self.objective, Time):
+    def _check_objective(self) -> None:
+        sought = [type(term) for weight, term in self.objective.terms if weight]
+        if FinalMass in sought and not self.actuator.burns:
+            raise ValueError(
+                f"the final mass is always {self.mass:g} kg with {type(self.actuator).__name__}; "
+                "use an actuator that burns propellant, Engine(max_thrust, specific_impulse)"
+            )
+        if set(sought) != {Time}:
             return
         if not self.free_duration:
             given = self.duration_bounds[0]

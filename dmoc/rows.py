@@ -10,12 +10,20 @@ import numpy as np
 
 
 class Row(NamedTuple):
-    """lower <= expression <= upper, dimensionless and of order 1."""
+    """lower <= expression <= upper, of order 1 and dimensionless; or in `unit`, "m" or "m/s"."""
 
     name: str
     expression: Any
     lower: float
     upper: float
+    unit: str = ""
+
+    def scaled(self, length: float, time: float) -> Row:
+        """The same row without its unit, given the NLP's units of length [m] and time [s]."""
+        size = {"": 1.0, "m": length, "m/s": length / time}[self.unit]
+        return self._replace(
+            expression=self.expression / size, lower=self.lower / size, upper=self.upper / size, unit=""
+        )
 
 
 def with_symbols(part: Any, name: str) -> tuple[Any, list]:

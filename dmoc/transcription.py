@@ -64,7 +64,8 @@ class NLP:
             "objective": problem.objective == old.objective,
             "constraints": kinds(problem.constraints) == kinds(old.constraints),
             "free duration": problem.free_duration == old.free_duration,
-            "start and goal": kinds((problem.start, problem.goal)) == kinds((old.start, old.goal)),
+            "start": problem.start.structure == old.start.structure,
+            "goal": problem.goal.structure == old.goal.structure,
         }
         changed = [name for name, equal in same.items() if not equal]
         if changed:
@@ -116,6 +117,10 @@ class NLP:
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 if group.name == f"{end}.speed" and not np.isnan(velocity).any():
                     low[group.indices], high[group.indices] = -np.inf, np.inf
+
+    def objective(self, scaled: float) -> float:
+        """The objective in its own unit and sign."""
+        return self.problem.objective.sense * scaled * self.units.cost
 
     def pack(self, guess: Guess) -> np.ndarray:
         """Scaled unknowns of a guess that stands on this mesh."""
