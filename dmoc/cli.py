@@ -54,12 +54,10 @@ def list_problems() -> None:
     """List the problem files, those in ./problems first."""
     from dmoc import library, report
 
-    console = report.console()
     found = library.catalogue()
     if not found:
-        listing = " and ".join(map(str, library.folders()))
-        raise ValueError(f"no problem files; looked in {listing}")
-    console.print(report.catalogue(found))
+        raise ValueError(f"no problem files in {' or '.join(map(str, library.folders()))}")
+    report.console().print(report.catalogue(found))
 
 
 @app.command(epilog="Example: dmoc show free_flyer")
@@ -114,7 +112,9 @@ def solve(
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
     if plot is not None:
-        _draw(solution, plot, verdict)
+        from dmoc.plot import save_figure
+
+        save_figure(solution, plot, verdict)
     _show(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
 
 
@@ -154,7 +154,7 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
         solution = _attached(file, problem)
         verdict = verify(solution)
-    _show(solution, verdict, as_json, quiet=False, written=[])
+    _show(solution, verdict, as_json)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
@@ -166,6 +166,7 @@ def plot(
     """Draw a saved solution."""
     import dmoc
     from dmoc import report
+    from dmoc.plot import save_figure
 
     target = file.with_suffix(".png") if out is None else out
     _writable(target, drawn=True)
@@ -176,7 +177,7 @@ def plot(
         if problem is not None:
             raise
         _warn(f"zones and limits are left out: {error}")
-    _draw(solution, target, None)
+    save_figure(solution, target)
     report.console().print(f"wrote {target}")
 
 
@@ -245,13 +246,7 @@ def _writable(path: Path | None, drawn: bool = False) -> None:
             raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
 
 
-def _draw(solution: Solution, path: Path, verdict: Report | None) -> None:
-    from dmoc.plot import save_figure
-
-    save_figure(solution, path, report=verdict)
-
-
-def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet: bool, written: list[Path]) -> None:
+def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
     """Print the answer and exit with the code that says what it is worth."""
     from dmoc import report
 
