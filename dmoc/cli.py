@@ -57,7 +57,7 @@ def list_problems() -> None:
     found = library.catalogue()
     if not found:
         raise ValueError(f"no problem files in {' or '.join(map(str, library.folders()))}")
-    report.console().print(report.catalogue(found))
+    report.console().print(report.pairs(found))
 
 
 @app.command(epilog="Example: dmoc show free_flyer")
@@ -70,9 +70,9 @@ def show(problem: Name, settings: Settings = None) -> None:
     file, case = _problem(problem, settings)
     nlp = transcribe(case, DEFAULT_STEPS[2])
     console = report.console()
-    for part in (file.docstring, report.scene(case), report.parameters(file.parameters), report.sizes(nlp)):
-        console.print(part)
-        console.print()
+    tables = (report.scene(case), report.parameters(file.parameters), report.sizes(nlp))
+    for part in (report.prose(file.docstring), *tables):
+        console.print(part, "", sep="\n")
     console.print(f"{file.path}; solve it with: dmoc solve {problem}")
 
 

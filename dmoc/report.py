@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -46,7 +47,7 @@ def scene(problem: TransferProblem) -> RenderableType:
     """What is to be done, in words."""
     shortest, longest = problem.duration_bounds
     free = f"free between {shortest:g} and {longest:g} s"
-    return _pairs(
+    return pairs(
         [
             ("body", f"{problem.mass:g} kg, axes {', '.join('xyz'[: problem.dimension])}"),
             ("start", problem.start.words()),
@@ -58,6 +59,11 @@ def scene(problem: TransferProblem) -> RenderableType:
             ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
         ]
     )
+
+
+def prose(docstring: str) -> str:
+    """A docstring whose paragraphs may be broken anew; indented lines stay as they are."""
+    return re.sub(r"(?<=\S)\n(?=\S)", " ", docstring)
 
 
 def effect_words(effect: Effect) -> str:
@@ -103,7 +109,7 @@ def sizes(nlp: NLP) -> RenderableType:
     mesh = f"order {nlp.scheme.order}, {len(nlp.mesh) - 1} steps"
     counts = f"{nlp.columns.size} unknowns, {nlp.rows.size} rows"
     entries = f"nonzeros: {jacobian} in the Jacobian, {hessian} in the Hessian's upper triangle"
-    return _pairs([("NLP", [f"{counts} ({mesh})", entries])])
+    return pairs([("NLP", [f"{counts} ({mesh})", entries])])
 
 
 def ladder(solution: Solution) -> RenderableType:
@@ -114,8 +120,8 @@ def ladder(solution: Solution) -> RenderableType:
     if estimated:
         table.add_column("error [-]")
     for level in solution.ladder:
-        numbers = (level.order, level.steps, level.iterations)
-        row = [*map(str, numbers), f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
+        row = [str(number) for number in (level.order, level.steps, level.iterations)]
+        row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
         error = "" if level.error is None else f"{level.error:.1e}"
         table.add_row(*row, level.status, *([error] if estimated else []))
     return table
@@ -130,7 +136,9 @@ def checks(report: Report) -> RenderableType:
         else:
             verdict = Text("holds", "green") if check.ok else Text("FAILS", "bold red")
         value, limit = ("-" if number is None else f"{number:.4g}" for number in (check.value, check.limit))
-        table.add_row(check.name, value, limit, check.unit, verdict, check.note)
+        # a note of several lines is worth its room only where something is wrong
+        note = Text(check.note, no_wrap=check.ok, overflow="ellipsis" if check.ok else "fold")
+        table.add_row(check.name, value, limit, check.unit, verdict, note)
     return table
 
 
@@ -145,9 +153,9 @@ def answer(
     last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
     if quiet:
         return last
-    head = Text("Meshes, coarse to fine", "bold"), Text("Checks of the answer", "bold")
-    parts = (head[0], ladder(solution), *_accuracy(solution), Text(), head[1], checks(report), Text())
-    return Group(*parts, *_files(written), last)
+    meshes = Text("Meshes, coarse to fine", "bold"), ladder(solution), *_accuracy(solution), Text()
+    verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
+    return Group(*meshes, *verdicts, *_files(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
@@ -180,12 +188,7 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
         ("energy", f"{energy[0]:.10g} J/kg at the start, {energy[-1]:.10g} J/kg at the end"),
         ("energy drift" if kept else "energy change", f"{most:.2e} J/kg at most{share}"),
     ]
-    return _pairs(rows)
-
-
-def catalogue(found: Sequence[tuple[str, str]]) -> RenderableType:
-    """Problem files with what they are."""
-    return _pairs(found)
+    return pairs(rows)
 
 
 def figures(solution: Solution) -> str:
@@ -275,7 +278,8 @@ def _files(written: Sequence[Path]) -> list[Text]:
     return [Text(f"wrote {path}") for path in written]
 
 
-def _pairs(rows: Sequence[tuple[str, Any]]) -> Table:
+def pairs(rows: Sequence[tuple[str, Any]]) -> Table:
+    """Names with what belongs to them; a list gives one line an entry."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
