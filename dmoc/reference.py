@@ -92,7 +92,8 @@ def _dop853(dynamics: Dynamics, size: int, origin: np.ndarray, tolerances: np.nd
         push = dynamics.acceleration(t + fraction * h, y[:n] + origin, v, y[-1], force)
         return ca.vertcat(v, push, 0 if flow is None else -flow)
 
-    length, slopes = share * h, []
+    length = share * h
+    slopes: list[ca.SX] = []
     for row, place in zip(DOP853.A, DOP853.C, strict=True):
         moved = weighted(row[: len(slopes)], slopes)
         slopes.append(rate(begin + place * share, state + length * moved))
