@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".pdf", ".svg")
 SQUARED = "\u00b2"
-LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 1}
+LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
 def save_figure(solution: Solution, path: str | os.PathLike, report: Report | None = None) -> None:

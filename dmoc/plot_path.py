@@ -101,8 +101,10 @@ def _draw_arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: floa
 
 def _view(solution: Solution, drawn: np.ndarray, size: float) -> Corners:
     """Corners of what is shown: the path with its arrows, and as much of the scene as lies near it."""
-    low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
-    extent = max(float((high - low).max()), 1e-12)
+    # the last iterate of a failed solve may hold anything
+    drawn = drawn[np.isfinite(drawn).all(axis=1)]
+    low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else np.zeros((2, solution.dimension))
+    extent = float((high - low).max()) or 1.0
     near, far = low - REACH * extent, high + REACH * extent
     zones = solution.problem.constraints if solution.problem else ()
     boxes = [(center / size, center / size) for center in _attractors(solution)]

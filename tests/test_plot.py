@@ -305,6 +305,19 @@ def test_the_page_tells_what_failed():
     assert "all 1 checks hold" in figure(solved("1-D"), good).get_supxlabel()
 
 
+@pytest.mark.parametrize("name", ["2-D held", "3-D"])
+@pytest.mark.parametrize("lost", [slice(3, 4), slice(None)])
+def test_an_iterate_that_is_not_finite_is_still_drawn(name, lost, tmp_path):
+    solution = solved(name)
+    position = solution.position.copy()
+    position[lost] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        broken = dataclasses.replace(solution, path=dataclasses.replace(solution.path, position=position))
+        save_figure(broken, tmp_path / "s.png")
+    assert (tmp_path / "s.png").read_bytes().startswith(PNG)
+
+
 def test_far_walls_and_large_zones_do_not_hide_the_path():
     zones = [KeepOut((4, -1000.0), 999.0), KeepIn((-1e4, -1e4), (1e4, 1e4))]
     page = figure(solve(room(constraints=zones), steps=12))
