@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,11 +47,13 @@ class Answer:
 
 
 def make_solver(
-    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, progress: Progress | None = None
+    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, watch: Watch | None = None
 ) -> ca.Function:
     """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
     parts = nlp.assembly
-    floor = 4e-15 * len(nlp.mesh)
+    # rows are momenta: an error of 1e-10 in each is one of 1e-10 N in the force, so finer meshes ask for less,
+    # down to the rounding of positions over the shortest step
+    floor = 20 * np.finfo(float).eps * nlp.scheme.degree / np.diff(nlp.mesh).min()
     tolerance = max(min(1e-10, 1e-8 / len(nlp.mesh)), floor)
     settings: dict[str, Any] = {
         "jac_g": parts.jacobian,
@@ -79,8 +83,8 @@ def make_solver(
             "ipopt.warm_start_slack_bound_frac": 1e-8,
             "ipopt.warm_start_mult_bound_push": 1e-8,
         }
-    if progress is not None:
-        settings["iteration_callback"] = _Watch(nlp, progress)
+    if watch is not None:
+        settings["iteration_callback"] = watch
     settings |= options or {}
     return ca.nlpsol("solver", "ipopt", {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}, settings)
 
@@ -151,34 +155,52 @@ def worst_rows(nlp: NLP, problem: TransferProblem, x, g, count: int = 10) -> tup
     return tuple((name, float(both[i])) for name, i in zip(names, worst, strict=True) if both[i] > 0)
 
 
-class _Watch(ca.Callback):
-    """Tells `progress` about every iteration."""
+class Watch(ca.Callback):
+    """Follows the iterations: tells `progress` about each, and stops at Ctrl-C with the iterate kept.
 
-    def __init__(self, nlp: NLP, progress: Progress):
+    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs.
+    """
+
+    def __init__(self, nlp: NLP, progress: Progress | None = None):
         ca.Callback.__init__(self)
-        self.nlp, self.progress, self.iteration = nlp, progress, 0
-        self.bounds = nlp.bounds(nlp.problem)
+        self.nlp, self.progress, self.iteration, self.interrupted = nlp, progress, 0, False
         self.construct("watch", {})
 
-    def get_n_in(self):
+    def __enter__(self) -> Watch:
+        self.previous = None
+        if threading.current_thread() is threading.main_thread():
+            self.previous = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self.previous is not None:
+            signal.signal(signal.SIGINT, self.previous)
+
+    def _interrupt(self, *signal: Any) -> None:
+        self.interrupted = True
+
+    def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
 
-    def get_n_out(self):
+    def get_n_out(self) -> int:
         return 1
 
-    def get_name_in(self, i):
+    def get_name_in(self, i: int) -> str:
         return ca.nlpsol_out(i)
 
-    def get_sparsity_in(self, i):
-        sizes = {"f": 1, "x": self.nlp.columns.size, "lam_x": self.nlp.columns.size}
-        sizes |= {"g": self.nlp.rows.size, "lam_g": self.nlp.rows.size, "lam_p": self.nlp.assembly.p.numel()}
-        return ca.Sparsity.dense(sizes[ca.nlpsol_out(i)])
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        columns, rows = self.nlp.columns.size, self.nlp.rows.size
+        sizes = {"f": 1, "x": columns, "lam_x": columns, "g": rows, "lam_g": rows}
+        return ca.Sparsity.dense(sizes.get(ca.nlpsol_out(i), self.nlp.assembly.p.numel()))
 
-    def eval(self, arguments):
-        at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
-        worst = worst_rows(self.nlp, self.nlp.problem, at["x"], at["g"], count=1) or (("", 0.0),)
-        objective = float(at["f"]) * self.nlp.units.cost
-        steps = len(self.nlp.mesh) - 1
-        stop = self.progress(self.nlp.scheme.order, steps, self.iteration, objective, *worst[0])
+    def eval(self, arguments: list) -> list:
+        stop = self.interrupted
+        if self.progress is not None:
+            at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
+            x, g = np.array(at["x"]), np.array(at["g"])
+            worst = worst_rows(self.nlp, self.nlp.problem, x, g, count=1) or (("", 0.0),)
+            objective, steps = self.nlp.objective(float(at["f"])), len(self.nlp.mesh) - 1
+            order = self.nlp.scheme.order
+            stop |= bool(self.progress(order, steps, self.iteration, objective, *worst[0]))
         self.iteration += 1
-        return [1 if stop else 0]
+        return [int(stop)]

@@ -22,7 +22,7 @@ import numpy as np
 from dmoc.files import whole_file
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
-from dmoc.solution import Level, Provenance, Solution
+from dmoc.solution import Error, Level, Provenance, Solution
 
 FORMAT = "dmoc solution"
 FORMAT_VERSION = 1
@@ -107,9 +107,10 @@ def from_dataset(data: Any) -> Solution:
         str(facts["status"]),
         str(facts["message"]),
         tuple(Level(**level) for level in json.loads(facts["ladder"])),
-        float(facts["stationarity"]),
         tuple((str(name), float(size)) for name, size in json.loads(facts["worst"])),
-        json.loads(facts["details"]),
+        tolerance=json.loads(facts["tolerance"]),
+        error=Error(**error) if (error := json.loads(facts["error"])) else None,
+        reason=str(facts["reason"]),
         provenance=_provenance(data),
     )
 
@@ -159,7 +160,7 @@ def _attributes(solution: Solution) -> dict[str, Any]:
     if not about.created:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         about = replace(about, created=now, versions=_versions() | about.versions)
-    plain = "order steps duration status message objective stationarity iterations build_s solve_s"
+    plain = "order steps duration status message objective reason iterations build_s solve_s"
     texts = {
         "parameters": about.parameters,
         "options": about.options,
@@ -167,7 +168,8 @@ def _attributes(solution: Solution) -> dict[str, Any]:
         "control_units": about.control_units,
         "ladder": [asdict(level) for level in solution.ladder],
         "worst": solution.worst,
-        "details": solution.details,
+        "tolerance": solution.tolerance,
+        "error": asdict(solution.error) if solution.error else None,
     }
     return {
         "format": FORMAT,

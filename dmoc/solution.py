@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,24 @@ class Level:
     build_s: float
     solve_s: float
     status: str
+    error: float | None = None
+
+
+@dataclass(frozen=True)
+class Error:
+    """Estimated relative errors of a solution [-].
+
+    `path` and `objective` by Richardson's extrapolation from the mesh with every other step end;
+    `goal` measured: how far the independent integrator misses the goal with the same controls.
+    """
+
+    path: float
+    objective: float
+    goal: float
+
+    @property
+    def largest(self) -> float:
+        return max(self.path, self.objective, self.goal)
 
 
 @dataclass(frozen=True)
@@ -71,7 +89,7 @@ class Provenance:
             problem.name,
             problem.parameters,
             problem.start_time,
-            problem.objective.unit,
+            problem.objective.unit_with(problem.actuator),
             tuple(problem.actuator.labels(problem.dimension)),
             tuple(problem.actuator.units(problem.dimension)),
             options or {},
@@ -102,8 +120,8 @@ class Solution:
         The meshes on the way, coarse to fine.
     worst : tuple of (str, float)
         Names of the worst scaled constraint violations of a failed solve, with their sizes.
-    details : dict
-        What else who saves it wants to keep; plain values only.
+    tolerance, error, reason
+        What accuracy was asked for, the estimated errors, and why this mesh; empty without a tolerance.
     provenance : Provenance
     """
 
@@ -117,9 +135,10 @@ class Solution:
     status: str
     message: str
     ladder: tuple[Level, ...]
-    stationarity: float
     worst: tuple[tuple[str, float], ...] = ()
-    details: dict[str, Any] = field(default_factory=dict, compare=False)
+    tolerance: float | None = None
+    error: Error | None = None
+    reason: str = ""
     provenance: Provenance = field(kw_only=True)
 
     @property
@@ -241,7 +260,7 @@ class Solution:
             Where to; an existing file is replaced.
         provenance
             What only the caller knows, by the names of `Provenance` (`source_hash`, `parameters`,
-            `problem_name`, ...); other names are kept in `details`.
+            `problem_name`, ...).
 
         Raises
         ------
@@ -250,11 +269,7 @@ class Solution:
         """
         from dmoc.results import write
 
-        known = {f.name for f in fields(Provenance)}
-        facts = {name: value for name, value in provenance.items() if name in known}
-        others = {name: value for name, value in provenance.items() if name not in known}
-        kept = replace(self.provenance, **facts)
-        write(replace(self, provenance=kept, details=self.details | others), path)
+        write(replace(self, provenance=replace(self.provenance, **provenance)), path)
 
 
 def load(path: str | os.PathLike) -> Solution:

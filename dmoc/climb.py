@@ -1,0 +1,148 @@
+"""The way up: one problem solved on mesh after mesh, each from the answer of the one before."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.ipopt import Answer, Progress, Watch, make_solver, path_of, run, worst_rows
+from dmoc.mechanics import Dynamics
+from dmoc.mesh import Guess, uniform_mesh
+from dmoc.problem import TransferProblem
+from dmoc.simulate import end_momenta, force_of
+from dmoc.solution import Level, Provenance, Solution
+from dmoc.stability import flow_matrices, refuse_unstable
+from dmoc.transcription import NLP, transcribe_onto, units_of
+
+COARSEST_NODES = 100
+FINER = 4
+WIDEST_ROUNDING = 1e-2
+
+# What to try, in words, for each way Ipopt can end.
+ADVICE = {
+    "infeasible": "no path near the guess meets every row; relax the duration, the force limit or a zone, "
+    "or try another guess (this is a local verdict)",
+    "iteration limit": "raise options={'ipopt.max_iter': ...}, use fewer steps first, or give a better guess",
+    "invalid number": "the guess or an iterate met an undefined value (a distance of 0, say): change the guess",
+    "restoration failed": "look for contradictory or repeated conditions, then try another guess",
+    "diverging": "the objective has no lower bound here; limit the force or the duration",
+    "stopped": "interrupted; the best iterate is kept",
+    "failed": "try another guess, another number of steps, or hold=True",
+}
+
+
+class Climb:
+    """The last NLP and its answer, and every level so far, of one problem."""
+
+    def __init__(
+        self, problem: TransferProblem, options: dict[str, Any] | None = None, progress: Progress | None = None
+    ):
+        self.problem, self.options, self.progress = problem, options, progress
+        self.dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+        self.levels: list[Level] = []
+        self.nlp: NLP
+        self.answer: Answer
+
+    @property
+    def path(self) -> Guess:
+        """The last answer."""
+        return path_of(self.nlp, self.problem, self.answer)
+
+    def up_to(self, first: Guess) -> bool:
+        """Solve on the mesh of a first guess, by way of coarser meshes unless it brings multipliers along."""
+        refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
+        if first.multipliers:
+            return self.solve_on(first)
+        known, solved = first, False
+        for mesh, rounding in _stages(self._meshes(first), self.problem.actuator.smoothing):
+            solved = self.solve_on(known.onto(mesh, first.order, first.hold), rounding)
+            if self.answer.status == "stopped":
+                return False
+            if not solved and self.problem.free_duration:
+                longer = min(self.problem.duration_bounds[1], 10 * first.duration)
+                again = replace(first.onto(mesh, first.order, first.hold), duration=longer)
+                solved = self.solve_on(again, rounding)
+            # a coarse mesh may have no path where a finer one does: then go on from the first guess
+            known = self.path if solved else first
+        return solved
+
+    def solve_on(self, guess: Guess, rounding: float | None = None) -> bool:
+        """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
+        if self._attempt(guess, rounding):
+            return True
+        warm = bool(guess.multipliers) and self.answer.status != "stopped"
+        return warm and self._attempt(replace(guess, multipliers={}), rounding)
+
+    def _attempt(self, guess: Guess, rounding: float | None) -> bool:
+        begun = time.perf_counter()
+        problem = self.problem
+        if rounding is not None:
+            engine: Any = problem.actuator
+            problem = replace(problem, actuator=replace(engine, smoothing=rounding))
+        self.nlp = transcribe_onto(problem, guess, units_of(problem, guess))
+        watch = Watch(self.nlp, self.progress)
+        solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch)
+        built = time.perf_counter() - begun
+        with watch:
+            answer = self.answer = run(solver, self.nlp, problem, guess)
+        steps, objective = len(guess.mesh) - 1, self.nlp.objective(answer.objective)
+        self.levels.append(
+            Level(guess.order, steps, answer.iterations, objective, built, answer.seconds, answer.status)
+        )
+        return answer.status == "solved"
+
+    def _meshes(self, first: Guess) -> list[np.ndarray]:
+        """Meshes from coarse to the final one, each about four times finer than the one before.
+
+        The coarsest has 100 nodes, or as many as keep h omega below 1 on the guess: a mesh that
+        cannot follow the motion has optima of its own.
+        """
+        final = first.mesh
+        least = max(COARSEST_NODES // (first.order // 2), self.least_steps(first))
+        counts = [len(final) - 1]
+        while counts[-1] > 2 * least:
+            counts.append(max(least, -(-counts[-1] // FINER)))
+        places = np.linspace(0.0, 1.0, len(final))
+        coarser = [np.interp(uniform_mesh(count), places, final) for count in reversed(counts[1:])]
+        return [*coarser, final]
+
+    def least_steps(self, guess: Guess) -> int:
+        """Steps that keep h omega below 1 along a guess, omega the fastest rate of the linearised motion."""
+        sample = guess.onto(uniform_mesh(min(100, len(guess.mesh) - 1)), 2, guess.hold)
+        slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
+        flow, _ = flow_matrices(self.dynamics, sample, self.problem.start_time, slopes)
+        return max(2, int(guess.duration * np.abs(np.linalg.eigvals(flow)).max()))
+
+    def solution(self, **found: Any) -> Solution:
+        """What the last level found; `found` are further fields of the Solution."""
+        path, answer, problem = self.path, self.answer, self.problem
+        momentum, velocity = end_momenta(self.dynamics, path, problem.start_time)
+        success = answer.status == "solved"
+        return Solution(
+            problem=problem,
+            path=path,
+            velocity=velocity,
+            momentum=momentum,
+            force=force_of(self.dynamics, path.control),
+            objective=self.nlp.objective(answer.objective),
+            success=success,
+            status=answer.status,
+            message="a local optimum" if success else ADVICE[answer.status],
+            ladder=tuple(self.levels),
+            worst=() if success else worst_rows(self.nlp, problem, answer.x, answer.g),
+            provenance=Provenance.of(problem, self.options),
+            **found,
+        )
+
+
+def _stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:
+    """The meshes, each with the rounding of |F| at zero: wide on the coarse ones, as asked for on the last."""
+    if rounding is None:
+        return [(mesh, None) for mesh in meshes]
+    count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / rounding))), 0)
+    widths = [WIDEST_ROUNDING * 0.1**i for i in range(count)] + [rounding]
+    repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
+    return list(zip(repeated, widths + [rounding] * (len(meshes) - len(widths)), strict=True))
