@@ -7,10 +7,35 @@ dimension) and `m` the mass [kg]. Constants of an effect are baked into the grap
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import fields, is_dataclass
 from typing import Any
 
+from dmoc.docstrings import documented, first_line
 
-class Effect(ABC):
+
+class Part:
+    """Something that can say in one line what it is."""
+
+    def words(self) -> str:
+        """One line for a person: what the docstring says it is, and its numbers with units."""
+        name, docstring = type(self).__name__, type(self).__doc__
+        summary = first_line(docstring)
+        # a dataclass without a docstring has its signature there
+        summary = "" if summary.startswith(f"{name}(") else summary.split(":")[0].rstrip(".")
+        numbers = ", ".join([name, *self._numbers()])
+        return f"{summary} ({numbers})" if summary else numbers
+
+    def _numbers(self) -> list[str]:
+        entries = documented(type(self).__doc__)
+        members: tuple = fields(self) if is_dataclass(self) else ()
+        return [
+            f"{member.name} {_in_words(value, entries[member.name].unit if member.name in entries else '')}"
+            for member in members
+            if (value := getattr(self, member.name)) is not None
+        ]
+
+
+class Effect(Part, ABC):
     """Something that acts on the body. Derive from `Conservative` or `Force`, never from this."""
 
     def check_dimension(self, dimension: int) -> None:
@@ -33,7 +58,7 @@ class Force(Effect):
         """Force on the body [N]."""
 
 
-def need_dimension(effect: Effect, argument: str, needed: int, dimension: int) -> None:
+def need_dimension(effect: Any, argument: str, needed: int, dimension: int) -> None:
     """ValueError unless the argument's length fits the problem's dimension."""
     if needed != dimension:
         name = type(effect).__name__
@@ -41,3 +66,16 @@ def need_dimension(effect: Effect, argument: str, needed: int, dimension: int) -
             f"{name}: {argument} has {needed} entries but the problem has {dimension} dimensions; "
             f"give {dimension} entries"
         )
+
+
+def _in_words(value: Any, unit: str) -> str:
+    if isinstance(value, Part):
+        return f"{type(value).__name__}({', '.join(value._numbers())})"
+    if isinstance(value, (tuple, list)):
+        entries = ", ".join(_in_words(entry, "") for entry in value[:6])
+        text = f"({entries})" if len(value) <= 6 else f"({len(value)} values)"
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        text = f"{value:.10g}"
+    else:
+        text = getattr(value, "__name__", None) or str(value)
+    return f"{text} {unit}" if unit and unit not in ("-", "1") else text

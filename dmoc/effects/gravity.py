@@ -63,6 +63,51 @@ class PointGravity(Conservative):
 
 
 @dataclass(frozen=True)
+class J2(Conservative):
+    """Pull of an attractor's oblateness about the z axis, on top of a PointGravity at the origin.
+
+    l = mu j2 radius^2 / (2 r^3) (1 - 3 z^2 / r^2); in two dimensions the motion is in the equator, z = 0.
+    Undefined at the origin.
+
+    Parameters
+    ----------
+    mu : float
+        Gravitational parameter of the attractor [m^3/s^2].
+    radius : float
+        Its equatorial radius [m].
+    j2 : float
+        Second zonal harmonic, not normalised; 1.08263e-3 for the Earth [-].
+
+    References
+    ----------
+    H. D. Curtis, Orbital Mechanics for Engineering Students, 3rd edition (2014), equation (12.30).
+    """
+
+    mu: float
+    radius: float
+    j2: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
+        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
+        object.__setattr__(self, "j2", number("j2", self.j2, "-"))
+        if abs(self.j2) >= 1:
+            raise ValueError(
+                f"j2 must be less than 1 [-] (1.08263e-3 for the Earth); got {self.j2:g}: "
+                "the radius is an argument of its own"
+            )
+
+    def check_dimension(self, dimension: int) -> None:
+        if dimension == 1:
+            raise ValueError("J2 needs 2 (in the equator) or 3 dimensions; got 1")
+
+    def lagrangian(self, t, q, v, m):
+        squared = ca.dot(q, q)
+        pull = 0.5 * self.mu * self.j2 * self.radius**2 / (squared * ca.sqrt(squared))
+        return pull if q.numel() == 2 else pull * (1 - 3 * q[2] * q[2] / squared)
+
+
+@dataclass(frozen=True)
 class Spring(Conservative):
     """A linear spring to a fixed point: l = -(stiffness / m) |q - anchor|^2 / 2.
 
