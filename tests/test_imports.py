@@ -1,0 +1,181 @@
+"""Imports flow one way: problem, transcription, solver, solution, then what is judged, shown and saved.
+
+A new module must be added to `MAY_IMPORT` with what it may import, and nothing more. Names in capitals stand
+for groups of modules. Imports inside functions count too.
+"""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import dmoc
+
+ROOT = Path(dmoc.__file__).parent
+
+GROUPS = {
+    "BASICS": "checks docstrings files layout lobatto rows",
+    "EFFECTS": "effects effects.base effects.gravity effects.atmosphere effects.radiation effects.frames "
+    "effects.motion effects.third_body",
+    "PARTS": "actuators engines objectives constraints boundary elements orbits",
+    "NLP": "problem mechanics mesh assembly blocks guess transcription ipopt",
+    "MOTION": "reference simulate stability",
+    "ANSWER": "solution results climb refine solver",
+    "VERDICT": "case limits optimality verify",
+}
+
+MAY_IMPORT = {
+    "__init__": "",  # names are imported on first use
+    # numbers and words that know nothing of the rest
+    "checks": "",
+    "docstrings": "",
+    "files": "",
+    "layout": "",
+    "lobatto": "",
+    "rows": "",
+    # what acts, what pushes, what is minimised, what is forbidden, where it starts and ends
+    "effects.base": "docstrings",
+    "effects.gravity": "checks effects.base",
+    "effects.motion": "checks effects.base",
+    "effects.atmosphere": "checks effects.base effects.motion",
+    "effects.radiation": "checks effects.base effects.motion",
+    "effects.third_body": "checks effects.base effects.motion",
+    "effects.frames": "checks effects.base effects.gravity",
+    "effects": "EFFECTS",
+    "actuators": "checks rows engines",  # engines: a limited force can be metered, see ALLOWED_CYCLES
+    "engines": "actuators checks rows",
+    "objectives": "actuators checks",
+    "constraints": "checks rows",
+    "boundary": "checks rows",
+    "elements": "rows",
+    "orbits": "boundary checks elements rows",
+    "problem": "actuators boundary checks constraints effects.base objectives",
+    # the discrete equations, which know nothing of a transfer
+    "mechanics": "actuators effects.base lobatto",
+    "mesh": "lobatto",
+    "assembly": "",
+    # motion forward in time; the guess and the refinement may use it
+    "reference": "lobatto mechanics mesh",
+    "simulate": "checks lobatto mechanics mesh problem reference",
+    "stability": "lobatto mechanics mesh simulate",
+    # the way from a problem to a solution
+    "guess": "BASICS EFFECTS boundary mechanics mesh problem MOTION",
+    "blocks": "BASICS assembly mechanics mesh problem",
+    "transcription": "BASICS assembly blocks guess mechanics mesh problem",
+    "ipopt": "BASICS mesh problem transcription",
+    "solution": "BASICS mesh problem results",  # results: save and load, see ALLOWED_CYCLES
+    "results": "BASICS mesh problem solution",
+    "climb": "BASICS NLP MOTION solution",
+    "refine": "BASICS NLP MOTION solution climb",
+    "solver": "BASICS NLP MOTION solution climb refine",
+    # what is judged: never with the solver's own words
+    "case": "BASICS mechanics mesh problem simulate solution",
+    "limits": "BASICS case mechanics",
+    "optimality": "BASICS NLP case",
+    "verify": "BASICS NLP MOTION solution case limits optimality",
+    # what is shown: nothing above knows of it
+    "library": "docstrings problem",
+    "plot_style": "BASICS mesh solution",
+    "plot_path": "BASICS EFFECTS PARTS solution plot_style",
+    "plot": "BASICS EFFECTS PARTS NLP solution verify plot_style plot_path",
+    "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report",
+}
+
+# one of each pair imports the other inside a function, when it is asked for
+ALLOWED_CYCLES = {("actuators", "engines"), ("solution", "results")}
+
+FILES = sorted(ROOT.rglob("*.py"))
+
+
+def name_of(file):
+    """dmoc/effects/gravity.py: effects.gravity; dmoc/effects/__init__.py: effects."""
+    parts = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(file): file for file in FILES}
+
+
+def inside(module, names):
+    """Modules of dmoc that `from module import names` reaches, through the package's own table too."""
+    module = module.removeprefix("dmoc").removeprefix(".")
+    found = set()
+    for name in names:
+        longer = f"{module}.{name}".removeprefix(".")
+        if longer in MODULES:
+            found.add(longer)
+        elif module:
+            found.add(module)
+        elif name != "__version__":
+            found.add(dmoc._HOME_OF[name].removeprefix("dmoc."))
+    return found
+
+
+def imported(source):
+    """Modules of dmoc that a source imports anywhere."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.split(".")[0] == "dmoc":
+                    found.add(alias.name.removeprefix("dmoc").removeprefix(".") or "__init__")
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "write dmoc.name: a relative import hides where it comes from"
+            if node.module.split(".")[0] == "dmoc":
+                found |= inside(node.module, [alias.name for alias in node.names])
+    return found
+
+
+def allowed(module):
+    words = MAY_IMPORT[module].split()
+    return {name for word in words for name in GROUPS.get(word, word).split()} - {module}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_module_imports_what_the_table_lets_it(module):
+    assert module in MAY_IMPORT, f"add dmoc/{module} to MAY_IMPORT, with what it may import"
+    beyond = imported(MODULES[module].read_text()) - allowed(module)
+    assert not beyond, f"{module} imports {', '.join(sorted(beyond))}, against the flow"
+
+
+def test_the_table_itself_flows_one_way():
+    """Taking away modules that import nothing else of what is left, nothing is left."""
+    names = {name for module in MAY_IMPORT for name in allowed(module)}
+    assert names <= MAY_IMPORT.keys(), f"not in the table: {names - MAY_IMPORT.keys()}"
+    left = {
+        module: allowed(module) - {"effects" if module.startswith("effects.") else ""} for module in MAY_IMPORT
+    }
+    for back, forth in ALLOWED_CYCLES:
+        left[back] = left[back] - {forth}
+    while leaves := [module for module, needs in left.items() if not needs & left.keys()]:
+        for module in leaves:
+            del left[module]
+    assert not left, f"these import each other in a circle: {sorted(left)}"
+
+
+@pytest.mark.parametrize(
+    "source, found",
+    [
+        ("from dmoc.solver import solve", {"solver"}),
+        ("import dmoc.solver as s", {"solver"}),
+        ("from dmoc import solve", {"solver"}),
+        ("from dmoc import solver", {"solver"}),
+        ("def f():\n    from dmoc.effects import gravity, Spring", {"effects.gravity", "effects"}),
+        ("import numpy\nfrom dmoc import __version__", set()),
+    ],
+)
+def test_every_way_to_import_is_seen(source, found):
+    assert imported(source) == found
+
+
+def test_the_front_loads_nothing_heavy():
+    """`dmoc --help` answers before CasADi, SciPy, matplotlib and xarray are loaded."""
+    script = (
+        "import sys, dmoc, dmoc.cli, dmoc.library, dmoc.report\n"
+        "print(*sorted({'casadi', 'scipy', 'matplotlib', 'xarray'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
