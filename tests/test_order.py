@@ -117,13 +117,20 @@ REFERENCE_STEPS = 96
 MESHES = {2: (576, 1152, 2304), 4: (48, 96, 192), 6: (24, 32, 48), 8: (8, 12, 16, 24, 32)}
 
 
+def graded(steps):
+    """Steps that shrink smoothly towards both ends, to a third of the longest."""
+    even = np.linspace(0, 1, steps + 1)
+    return even - np.sin(np.pi * even) * np.cos(np.pi * even) / (2 * np.pi)
+
+
 @lru_cache
-def transfer(scene, order, steps, hold=False):
+def transfer(scene, order, steps, hold=False, mesh=None):
     """From the circular orbit of radius 1 to that of 1.5 by 4 rad in 5 time units, least effort."""
     speed = 1 / math.sqrt(1.5)
     goal = State((1.5 * math.cos(4), 1.5 * math.sin(4)), (-speed * math.sin(4), speed * math.cos(4)))
     problem = TransferProblem(1.0, State((1, 0), (0, 1)), goal, 5.0, effects=TRANSFERS[scene])
-    return solve(problem, order=order, steps=steps, hold=hold).raise_for_status()
+    mesh = None if mesh is None else mesh(steps)
+    return solve(problem, order=order, steps=steps, mesh=mesh, hold=hold).raise_for_status()
 
 
 def at_step_ends(solution):
@@ -151,6 +158,15 @@ def test_optimal_transfer(scene, order):
     """State, control, costate at the step ends, and cost, all of one order."""
     reference = at_step_ends(transfer(scene, 8, REFERENCE_STEPS))
     found = [at_step_ends(transfer(scene, order, steps)) for steps in MESHES[order]]
+    for name, expected in reference.items():
+        errors = [relative_error(each[name], expected) for each in found]
+        assert observed_order(MESHES[order], errors) > order - SLACK, name
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_optimal_transfer_on_a_graded_mesh(order):
+    reference = at_step_ends(transfer("gravity", 8, REFERENCE_STEPS, mesh=graded))
+    found = [at_step_ends(transfer("gravity", order, steps, mesh=graded)) for steps in MESHES[order]]
     for name, expected in reference.items():
         errors = [relative_error(each[name], expected) for each in found]
         assert observed_order(MESHES[order], errors) > order - SLACK, name
