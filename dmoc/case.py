@@ -50,6 +50,18 @@ class Case:
         }
         return ", ".join(name for name, values in parts.items() if not np.isfinite(values).all())
 
+    def misreported(self) -> float:
+        """How far velocity, momentum and force of the solution are off those of its path [-]."""
+        solution, largest = self.solution, self.largest or 1.0
+        reports = (
+            (solution.velocity, self.velocity, self.speed),
+            (solution.momentum, self.momentum, np.abs(self.momentum).max() or 1.0),
+            (solution.force, self.force, largest),
+        )
+        if any(np.shape(reported) != true.shape for reported, true, _ in reports):
+            return np.inf
+        return float(np.max([np.abs(reported - true).max() / scale for reported, true, scale in reports]))
+
     @cached_property
     def node_velocity(self) -> np.ndarray:
         """Velocity at every node: from the momenta at the step ends, of a polynomial with those inside."""

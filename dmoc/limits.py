@@ -15,6 +15,8 @@ from dmoc.mechanics import state_symbols
 # What the optimiser may leave of a limit, what round-off may leave of an entry that is simply fixed,
 # and how deep a path may cut into a zone between nodes however coarse its mesh.
 BOUND, EXACT, DEEPEST = 1e-6, 1e-9, 1e-2
+# Into how many parts a gap between two nodes is divided, at least, and how many that may be in all.
+FEWEST, MOST_SAMPLES = 8, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -91,13 +93,15 @@ def _zones(case: Case) -> Iterable[Excess]:
 
     Rows act at nodes alone, so between two of them a path may cut into a zone: by what the chord
     does, d^2 / 8r for nodes a distance d apart at a sphere of radius r, and by how far the path bends
-    away from its chord. Both are of order h^2, and neither excuses more than a hundredth of the zone.
+    away from its chord. A speed limit acts on mean velocities inside the steps, from which those at
+    the nodes differ by half of what they are off the line between their neighbours. All of this is of
+    order h^2, and none of it excuses more than a hundredth.
     """
     if not case.problem.constraints:
         return
     path, chord, velocity, straight = _between(case)
     bend = _most(np.linalg.norm(path - chord, axis=1))
-    sway = _most(np.linalg.norm(velocity - straight, axis=1))
+    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(case.time, case.node_velocity)
     still = np.zeros_like(path)
     for i, constraint in enumerate(case.problem.constraints):
         name = f"{type(constraint).__name__} {i + 1}"
@@ -113,13 +117,17 @@ def _zones(case: Case) -> Iterable[Excess]:
         yield Excess(f"{name} between nodes", between, BOUND * case.extent + cut, constraint.unit)
 
 
-def _between(case: Case, parts: int = 8) -> tuple[np.ndarray, ...]:
+def _between(case: Case) -> tuple[np.ndarray, ...]:
     """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
 
-    The path is the cubic that has the positions and velocities of both nodes.
+    The path is the cubic that has the positions and velocities of both nodes; it is looked at often
+    enough not to step over a zone that is smaller than a gap.
     """
     q, v = case.position, case.node_velocity
     tau = np.diff(case.time)[:, None, None]
+    longest = float(np.linalg.norm(np.diff(q, axis=0), axis=1).max())
+    smallest = min(getattr(constraint, "radius", np.inf) for constraint in case.problem.constraints)
+    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_SAMPLES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
     mean = np.diff(q, axis=0)[:, None] / tau
     first, second = v[:-1, None] - mean, v[1:, None] - mean
@@ -129,6 +137,13 @@ def _between(case: Case, parts: int = 8) -> tuple[np.ndarray, ...]:
     straight = (1 - u) * v[:-1, None] + u * v[1:, None]
     inside = (values.reshape(-1, q.shape[1]) for values in (path, chord, velocity, straight))
     return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
+
+
+def _bump(time: np.ndarray, values: np.ndarray) -> float:
+    """How far values are at most off the line between their neighbours in time."""
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+    line = (1 - share) * values[:-2] + share * values[2:]
+    return _most(np.linalg.norm(values[1:-1] - line, axis=1))
 
 
 def _most(values: Any) -> float:

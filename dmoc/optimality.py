@@ -25,7 +25,8 @@ class Stationarity:
         Derivative of the Lagrangian along the controls: for least effort |lambda + m F| over the force.
     path : float
         The same along positions, masses and ends: the defect of the costate equations, summed up
-        along the path as errors are.
+        along the path as errors are. Entries that are fixed count: their multipliers are the
+        derivatives of the objective by the boundary data.
     limits : float
         Multipliers of limits that do not act, or of the wrong sign, times the distance from the limit.
     objective : float
@@ -52,7 +53,7 @@ def stationarity(case: Case) -> Stationarity:
     x, p = nlp.pack(case.path), nlp.parameters(case.problem)
     lbx, ubx, lbg, ubg = nlp.bounds(case.problem)
     slope, rows, cost = _evaluate(blocks, nlp, x, p, lam_g)
-    slope = np.where(lbx < ubx, slope + lam_x, 0.0)
+    slope = slope + lam_x
     weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
     weights["control"] = weights["step" if nlp.hold else "node"]
     along = [group.of(slope) for group in nlp.columns.groups if group.kind != "control"]

@@ -70,7 +70,7 @@ def flow_matrices(
     function = ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)])
     times = start_time + path.duration * path.mesh
     stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
-    constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v))
+    constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v, *([m] if dynamics.actuator.burns else [])))
     return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
 
 
@@ -103,7 +103,8 @@ def refuse_unstable(dynamics: Dynamics, guess: Guess, start_time: float, shortes
     growth = growth_along(dynamics, probe, start_time, velocity, matrices)
     if not growth.ok:
         steps = len(guess.mesh) - 1
+        enough = int(steps * growth.frequency) + 1
         raise ValueError(
             f"{steps} steps of order {order} are unstable for this scene: h omega = {growth.frequency:.3g}, "
-            f"errors grow {growth.value:.3g} times a step; use {int(steps * growth.frequency) + 1} steps"
+            f"errors grow {growth.value:.3g} times a step; use at least {enough} steps"
         )
