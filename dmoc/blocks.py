@@ -74,9 +74,10 @@ class Transcript:
 
     def _add_rows(self, name: str, kind: str, rows: Sequence[Row], count: int, scale=1.0) -> Group:
         self.rows = self.rows.add(name, kind, [row.name for row in rows], count, scale)
-        self._lower.append(np.tile([row.lower for row in rows], count))
-        self._upper.append(np.tile([row.upper for row in rows], count))
-        return self.rows.groups[-1]
+        group = self.rows.groups[-1]
+        self._lower.append((np.array([row.lower for row in rows]) * group.scales).ravel())
+        self._upper.append((np.array([row.upper for row in rows]) * group.scales).ravel())
+        return group
 
     def _node_block(self) -> Block:
         """Impulse, cost and limits of one node."""
@@ -236,8 +237,9 @@ class _Local:
         """Rows of this block alone."""
         if rows:
             units = self.transcript.units
-            rows = [row.scaled(units.length, units.time) for row in rows]
-            group = self.transcript._add_rows(name, kind, rows, self.count)
+            sizes = {"": 1.0, "m": units.length, "m/s": units.length / units.time}
+            scale = np.array([[1 / sizes[row.unit] for row in rows]])
+            group = self.transcript._add_rows(name, kind, rows, self.count, scale)
             self.add(group, ca.vertcat(*[row.expression for row in rows]))
 
     def block(self, name: str) -> Block:

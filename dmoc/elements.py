@@ -48,7 +48,7 @@ def element_rows(orbit: Any, q: Any, v: Any, planar: bool) -> list[Row]:
     if _is(orbit.e, 0.0):
         # |e|^2 = 0 has no gradient where it holds: its two components instead, without dividing by h
         return [*rows, Row("e_along", e_r, 0.0, 0.0), Row("e_across", ca.dot(q, v) / ca.sqrt(mu * r), 0.0, 0.0)]
-    return rows if orbit.e is None else [*rows, Row("e", e_r**2 + e_s**2 - orbit.e**2, 0.0, 0.0)]
+    return rows if orbit.e is None else [*rows, Row("e", (e_r**2 + e_s**2) / orbit.e - orbit.e, 0.0, 0.0)]
 
 
 def _plane_rows(i: Any, raan: Any, normal: Any) -> list[Row]:
@@ -114,34 +114,46 @@ def _flat(i: Any) -> bool:
 def nearest_state(
     wanted: dict[str, float], mu: float, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A state with the elements `wanted`; the others, direction and distance as near as may be to q, v.
+    """A state with the elements `wanted`; energy, direction and distance stay near those of q, v.
 
     `q` and `v` have three entries, from the attractor.
     """
-    node, side = _nearest_plane(wanted, np.cross(q, v))
-    pull = np.cross(v, np.cross(q, v)) / mu - _unit(q, node)
-    latitude, periapsis = (math.atan2(x @ side, x @ node) for x in (q, pull))
-    if np.linalg.norm(pull) < 1e-6:
-        periapsis = latitude
-    e = wanted["e"] if "e" in wanted else _likely_eccentricity(wanted, float(np.linalg.norm(pull)))
-    argp, nu = _nearest_angles(wanted, latitude, periapsis)
+    distance, h = float(np.linalg.norm(q)), np.cross(q, v)
+    node, side = _nearest_plane(wanted, h)
+    pull = float(np.linalg.norm(np.cross(v, h) / mu - q / distance))
+    e, a = _nearest_shape(wanted, 2 / distance - v @ v / mu, pull)
+    parameter = distance * (1 + e) if a is None else a * (1 - e**2)
+    reach = np.clip((parameter / distance - 1) / (e or 1.0), -1.0, 1.0)
+    nu = math.copysign(math.acos(reach), q @ v) if e > 0 else 0.0
+    latitude = math.atan2(q @ side, q @ node)
+    argp = wanted.get("argp", latitude - wanted.get("nu", nu))
+    nu = wanted.get("nu", latitude - argp)
     if 1 + e * math.cos(nu) < 0.05:
         # such an orbit does not reach there, or only far away: take its periapsis
-        nu, argp = 0.0, wanted.get("argp", argp + nu)
-    reach = 1 + e * math.cos(nu)
-    parameter = wanted["a"] * (1 - e**2) if "a" in wanted else float(np.linalg.norm(q)) * reach
-    place = math.cos(argp + nu) * node + math.sin(argp + nu) * side
-    across = math.cos(argp + nu) + e * math.cos(argp)
-    along = math.sin(argp + nu) + e * math.sin(argp)
-    return parameter / reach * place, math.sqrt(mu / parameter) * (across * side - along * node)
+        nu, argp = 0.0, wanted.get("argp", latitude)
+    x, y = math.cos(argp + nu), math.sin(argp + nu)
+    velocity = (x + e * math.cos(argp)) * side - (y + e * math.sin(argp)) * node
+    position = parameter / (1 + e * math.cos(nu)) * (x * node + y * side)
+    return position, math.sqrt(mu / parameter) * velocity
 
 
-def _likely_eccentricity(wanted: dict[str, float], near: float) -> float:
-    """One that fits the energy, is far from a parabola, and has a periapsis if that is asked for."""
+def _nearest_shape(wanted: dict[str, float], curve: float, e: float) -> tuple[float, float | None]:
+    """Eccentricity and semi-major axis near a state with 1/a = `curve`; None where that does not help.
+
+    An eccentricity that is free fits the energy, is far from a parabola, and has a periapsis if an
+    angle from it is asked for.
+    """
+    a = wanted.get("a")
     least = 0.1 if {"argp", "nu"} & set(wanted) else 0.0
-    if "a" not in wanted:
-        return max(near, least)
-    return float(np.clip(near, least, 0.7) if wanted["a"] > 0 else max(near, 1.5))
+    if "e" in wanted:
+        e = wanted["e"]
+    elif a is None:
+        e = max(e, least)
+    else:
+        e = float(np.clip(e, least, 0.7)) if a > 0 else max(e, 1.5)
+    if a is None and e < 1 and curve > 0:
+        a = 1 / curve
+    return e, a
 
 
 def _nearest_plane(wanted: dict[str, float], h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,14 +164,6 @@ def _nearest_plane(wanted: dict[str, float], h: np.ndarray) -> tuple[np.ndarray,
     node = np.array([math.cos(raan), math.sin(raan), 0.0])
     level = np.array([math.sin(raan), -math.cos(raan), 0.0])
     return node, np.cross(math.sin(i) * level + math.cos(i) * np.array([0.0, 0.0, 1.0]), node)
-
-
-def _nearest_angles(wanted: dict[str, float], latitude: float, periapsis: float) -> tuple[float, float]:
-    """Argument of the periapsis and anomaly that keep the direction of the position."""
-    if "argp" in wanted:
-        return wanted["argp"], wanted.get("nu", latitude - wanted["argp"])
-    nu = wanted.get("nu", latitude - periapsis)
-    return latitude - nu, nu
 
 
 def plane_elements(normal: np.ndarray) -> dict[str, float]:

@@ -130,7 +130,7 @@ def _multiplier_groups(nlp: NLP, lam_x: np.ndarray, lam_g: np.ndarray):
         (nlp.rows, "row", lam_g, False),
     ):
         for group in layout.groups:
-            scale = np.broadcast_to(np.asarray(group.scale, float), (group.count,))[:, None]
+            scale = group.scales
             density = weights.get(group.kind, np.ones(group.count))[:, None]
             yield (
                 f"{group.kind}:{side}:{group.name}",

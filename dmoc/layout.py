@@ -32,6 +32,12 @@ class Group:
     def stop(self) -> int:
         return self.start + len(self.labels) * self.count
 
+    @property
+    def scales(self) -> np.ndarray:
+        """Scale of every place, shape (count, components), from a number, one an index, or a table."""
+        scale = np.asarray(self.scale, float)
+        return np.broadcast_to(scale[:, None] if scale.ndim == 1 else scale, (self.count, len(self.labels)))
+
     def of(self, vector: np.ndarray) -> np.ndarray:
         """This group's part of a vector, shape (count, components)."""
         return np.asarray(vector)[self.start : self.stop].reshape(self.count, len(self.labels))
@@ -68,9 +74,5 @@ class Layout:
         return next(group for group in self.groups if place < group.stop).name_of(place)
 
     def scales(self) -> np.ndarray:
-        """Scale of every place; a group's scale is one number, or one for each of its indices."""
-        parts = [
-            np.repeat(np.broadcast_to(np.asarray(group.scale, float), (group.count,)), len(group.labels))
-            for group in self.groups
-        ]
-        return np.concatenate([*parts, np.empty(0)])
+        """Scale of every place."""
+        return np.concatenate([*(group.scales.ravel() for group in self.groups), np.empty(0)])

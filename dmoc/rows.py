@@ -18,13 +18,6 @@ class Row(NamedTuple):
     upper: float
     unit: str = ""
 
-    def scaled(self, length: float, time: float) -> Row:
-        """The same row without its unit, given the NLP's units of length [m] and time [s]."""
-        size = {"": 1.0, "m": length, "m/s": length / time}[self.unit]
-        return self._replace(
-            expression=self.expression / size, lower=self.lower / size, upper=self.upper / size, unit=""
-        )
-
 
 def with_symbols(part: Any, name: str) -> tuple[Any, list]:
     """A twin of a part whose adjustable fields are CasADi symbols, and those symbols."""
