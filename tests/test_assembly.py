@@ -15,6 +15,7 @@ from dmoc import (
     KeepIn,
     KeepOut,
     LinearDrag,
+    Nozzles,
     Objective,
     PointGravity,
     RotatingFrame,
@@ -199,6 +200,24 @@ def test_another_problem_is_refused_by_the_name_of_the_change(what):
     nlp = transcribe(in_the_plane(effects=[GRAVITY], actuator=BallForce(3.0)), 5)
     with pytest.raises(ValueError, match=rf"another {what}.*transcribe the new problem"):
         nlp.accepts(CHANGES[what])
+
+
+@pytest.mark.xfail(
+    strict=True, reason="only the types of actuators are compared, not what is baked into the graph"
+)
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        (Nozzles([(1, 0), (-1, 0), (0, 1), (0, -1)], 3.0), Nozzles([(1, 1), (-1, -1), (-1, 1), (1, -1)], 3.0)),
+        (Nozzles([(1, 0), (-1, 0), (0, 1), (0, -1)], 3.0), Nozzles([(1, 0), (-1, 1), (-1, -1)], 3.0)),
+        (Engine(3.0), Engine(3.0, exhaust_velocity=9.0)),
+    ],
+    ids=["directions", "number of nozzles", "burning"],
+)
+def test_another_actuator_of_the_same_kind_is_refused(old, new):
+    nlp = transcribe(in_the_plane(actuator=old), 5)
+    with pytest.raises(ValueError, match="another actuator"):
+        nlp.accepts(in_the_plane(actuator=new))
 
 
 def test_new_numbers_are_accepted():
