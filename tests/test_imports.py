@@ -77,11 +77,14 @@ MAY_IMPORT = {
     "verify": "BASICS NLP MOTION solution case limits optimality",
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
+    "study": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
+    "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
+    "export": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
     "plot_style": "BASICS mesh solution",
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verify plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report",
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study sweep export",
 }
 
 # one of each pair imports the other inside a function, when it is asked for
