@@ -186,10 +186,10 @@ class WeightedSum(Objective):
 
     def __post_init__(self) -> None:
         pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
-        if len(pulls) != 1:
+        if len(pulls) > 1:
             raise ValueError(
-                f"the sum {self.formula} does not say what to do: subtract what is maximised from what is "
-                "minimised, as in Effort() - 2 * FinalMass(), and give at least one weight that is not 0"
+                f"the sum {self.formula} pulls two ways: subtract what is maximised from what is minimised, "
+                "as in Effort() - 2 * FinalMass()"
             )
 
     @property
@@ -198,7 +198,7 @@ class WeightedSum(Objective):
 
     @property
     def sense(self) -> int:  # type: ignore[override]
-        return 1 if any(weight * term.sense > 0 for weight, term in self.parts) else -1
+        return -1 if any(weight * term.sense < 0 for weight, term in self.parts) else 1
 
     @property
     def metered(self) -> bool:  # type: ignore[override]
