@@ -99,9 +99,10 @@ def _zones(case: Case) -> Iterable[Excess]:
     """
     if not case.problem.constraints:
         return
-    path, chord, velocity, straight = _between(case)
+    longest = float(np.linalg.norm(np.diff(case.position, axis=0), axis=1).max())
+    path, chord, velocity, straight = _between(case, longest)
     bend = _most(np.linalg.norm(path - chord, axis=1))
-    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(case.time, case.node_velocity)
+    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(case)
     still = np.zeros_like(path)
     for i, constraint in enumerate(case.problem.constraints):
         name = f"{type(constraint).__name__} {i + 1}"
@@ -111,21 +112,21 @@ def _zones(case: Case) -> Iterable[Excess]:
             continue
         at_nodes = _most(constraint.excess(case.position, case.node_velocity))
         yield Excess(f"{name} at nodes", at_nodes, BOUND * case.extent, constraint.unit)
-        size = min(getattr(constraint, "radius", np.inf), case.extent)
-        cut = min(_most(constraint.excess(chord, still)) + bend, DEEPEST * size)
+        radius = getattr(constraint, "radius", None)
+        cut = longest**2 / (8 * radius) if radius else _most(constraint.excess(chord, still))
+        cut = min(cut + bend, DEEPEST * min(radius or np.inf, case.extent))
         between = _most(constraint.excess(path, still))
         yield Excess(f"{name} between nodes", between, BOUND * case.extent + cut, constraint.unit)
 
 
-def _between(case: Case) -> tuple[np.ndarray, ...]:
+def _between(case: Case, longest: float) -> tuple[np.ndarray, ...]:
     """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
 
     The path is the cubic that has the positions and velocities of both nodes; it is looked at often
-    enough not to step over a zone that is smaller than a gap.
+    enough not to step over a zone that is smaller than the longest gap [m].
     """
     q, v = case.position, case.node_velocity
-    tau = np.diff(case.time)[:, None, None]
-    longest = float(np.linalg.norm(np.diff(q, axis=0), axis=1).max())
+    tau = case.path.duration * np.diff(case.path.fractions)[:, None, None]
     smallest = min(getattr(constraint, "radius", np.inf) for constraint in case.problem.constraints)
     parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_SAMPLES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
@@ -139,11 +140,12 @@ def _between(case: Case) -> tuple[np.ndarray, ...]:
     return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
 
 
-def _bump(time: np.ndarray, values: np.ndarray) -> float:
-    """How far values are at most off the line between their neighbours in time."""
+def _bump(case: Case) -> float:
+    """How far the velocity at a node is at most off the line between its neighbours in time [m/s]."""
+    time, velocity = case.path.fractions, case.node_velocity
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
-    line = (1 - share) * values[:-2] + share * values[2:]
-    return _most(np.linalg.norm(values[1:-1] - line, axis=1))
+    line = (1 - share) * velocity[:-2] + share * velocity[2:]
+    return _most(np.linalg.norm(velocity[1:-1] - line, axis=1))
 
 
 def _most(values: Any) -> float:
