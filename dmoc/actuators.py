@@ -26,6 +26,11 @@ class Actuator(ABC):
     smoothing: float | None = None
 
     @property
+    def structure(self) -> tuple:
+        """What cannot change in a re-solve: two actuators with the same structure have the same rows."""
+        return (type(self),)
+
+    @property
     def burns(self) -> bool:
         """Whether it uses propellant, so that the mass changes."""
         return False
@@ -66,7 +71,7 @@ class Actuator(ABC):
         """Propellant burnt [kg/s]; None where the mass does not change."""
         return None
 
-    def metered(self) -> Actuator:
+    def metered(self, dimension: int) -> Actuator:
         """The same actuator with the magnitude of its force among the controls, which least fuel needs."""
         raise ValueError(
             f"least fuel with {type(self).__name__} has no optimum: impulses without limit cost least; "
@@ -118,10 +123,10 @@ class BoxForce(Actuator):
         limit = np.broadcast_to(np.asarray(self.limit, float), (dimension,)).copy()
         return -limit, limit
 
-    def metered(self) -> Actuator:
+    def metered(self, dimension: int) -> Actuator:
         from dmoc.engines import Engine
 
-        limits = np.broadcast_to(np.asarray(self.limit, float), (3,))
+        limits = np.broadcast_to(np.asarray(self.limit, float), (dimension,))
         return Engine(float(np.linalg.norm(limits)), box=self.limit)
 
     def force_limit(self) -> float:
@@ -155,7 +160,7 @@ class BallForce(Actuator):
     def rows(self, u: Any) -> list[Row]:
         return [Row("magnitude", ca.dot(u, u) / self.limit**2, -np.inf, 1.0)]
 
-    def metered(self) -> Actuator:
+    def metered(self, dimension: int) -> Actuator:
         from dmoc.engines import Engine
 
         return Engine(self.limit)

@@ -139,11 +139,28 @@ class Transcript:
             self._burn(local, h, m, [self.actuator.flow(control) for control in u])
         if self._cost_in_steps():
             v = step_velocities(rule, h, r)
+            if self.hold:
+                v[0], v[-1] = self._end_velocities(t0, h, r, m, push)
             rates = [
                 self._rate(t0 + c * h, r[j] + self.origin, v[j], u[j], m[j]) for j, c in enumerate(rule.points)
             ]
             local.cost = h * weighted(rule.weights, rates)
         return local.block("step")
+
+    def _end_velocities(self, t0: Any, h: Any, r: list, m: list, push: list) -> tuple:
+        """Velocities at the ends of a step from its momenta.
+
+        Its mean velocity does not see a held force that alternates from step to step, and a cost of
+        it alone lets the force do so.
+        """
+
+        def point(t, r, v, m):
+            return self.dynamics.point(t, r + self.origin, v, m)
+
+        momenta = step_momenta(self.rule, point, t0, h, r, m, push)
+        ends = ((t0, r[0], -momenta[0], m[0]), (t0 + h, r[-1], momenta[-1], m[-1]))
+        first, last = (self.dynamics.velocity(t, q + self.origin, p, m) for t, q, p, m in ends)
+        return first, last
 
     def _burn(self, local: _Local, h: Any, m: list, flow: list) -> None:
         """Node masses by the Lobatto IIIA matrix A: m_i = m_0 - h sum_j A_ij flow_j, s rows a step.

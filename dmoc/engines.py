@@ -1,4 +1,4 @@
-"""What pushes and burns: thrust with a magnitude of its own, and with an exhaust velocity a mass that shrinks."""
+"""What pushes and burns: thrust with a magnitude of its own, and a mass that shrinks."""
 
 from __future__ import annotations
 
@@ -22,13 +22,17 @@ class _Burner(Actuator):
     dry_mass: float
 
     @property
+    def structure(self) -> tuple:
+        return type(self), self.burns
+
+    @property
     def burns(self) -> bool:
         return self.exhaust_velocity is not None
 
     def flow(self, u: Any) -> Any:
         return self.throttle(u) / self.exhaust_velocity if self.burns else None
 
-    def metered(self) -> Actuator:
+    def metered(self, dimension: int) -> Actuator:
         return self
 
     def _check_exhaust(self, specific_impulse: Any) -> None:
@@ -173,6 +177,10 @@ class Nozzles(_Burner):
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
         return ("exhaust_velocity",) if self.burns else ()
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.burns, self.directions
 
     def check_dimension(self, dimension: int) -> None:
         if len(self.directions[0]) != dimension:

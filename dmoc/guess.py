@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.boundary import Boundary
+from dmoc.effects.base import Conservative
 from dmoc.effects.frames import RotatingFrame
 from dmoc.effects.gravity import PointGravity
 from dmoc.lobatto import scheme
@@ -139,7 +140,7 @@ def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarra
     """The velocity of a state as it would be at another place around the first attractor."""
     q, v = state
     attractor = next(effect for effect in problem.effects if isinstance(effect, PointGravity))
-    center = np.zeros(len(q)) if attractor.center is None else np.array(attractor.center)
+    center = _center(attractor, len(q))
     q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
     up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
     turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
@@ -157,11 +158,14 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1)
     forward = _coast(problem, 0.0, duration, q0, v0)
     backward = _coast(problem, duration, 0.0, q1, v1)
+    if forward.status != 0 or backward.status != 0:
+        # a coast that falls into an attractor is no path to start from
+        return _keep_clear(q0 + fractions[:, None] * (q1 - q0), attractors, q0, q1), (v0, v1)
     sample = np.linspace(0.0, 1.0, max(2000, 8 * forward.t.size, 8 * backward.t.size))
     arcs = [arc.sol(sample * duration)[: problem.dimension].T for arc in (forward, backward)]
     turning = any(isinstance(effect, RotatingFrame) for effect in problem.effects)
     if len(attractors) == 1 and not turning and problem.dimension > 1:
-        center = np.zeros(problem.dimension) if attractors[0].center is None else np.array(attractors[0].center)
+        center = _center(attractors[0], problem.dimension)
         states = ((q0 - center, v0), (q1 - center, v1))
         path = center + _blend_around(sample, arcs[0] - center, arcs[1] - center, states)
     else:
@@ -174,14 +178,30 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
 def _coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: np.ndarray) -> Any:
     from scipy.integrate import solve_ivp
 
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    # without what resists: backward in time drag feeds the motion without bound
+    conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
+    dynamics = Dynamics(problem.dimension, conservative, problem.actuator)
     n, still = problem.dimension, np.zeros(problem.dimension)
+    centers = [_center(effect, n) for effect in conservative if isinstance(effect, PointGravity)]
 
     def rate(t: float, state: np.ndarray) -> np.ndarray:
         push = dynamics.acceleration(problem.start_time + t, state[:n], state[n:], problem.mass, still)
         return np.concatenate([state[n:], np.array(push).ravel()])
 
-    return solve_ivp(rate, (start, end), np.concatenate([q, v]), rtol=1e-6, atol=1e-9, dense_output=True)
+    def fell_in(t: float, state: np.ndarray) -> float:
+        return min((_distance(state[:n], at) - 0.02 * _distance(q, at) for at in centers), default=1.0)
+
+    fell_in.terminal = True  # type: ignore[attr-defined]
+    settings = {"rtol": 1e-6, "atol": 1e-9, "dense_output": True, "events": fell_in}
+    return solve_ivp(rate, (start, end), np.concatenate([q, v]), **settings)
+
+
+def _center(attractor: PointGravity, dimension: int) -> np.ndarray:
+    return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b))
 
 
 def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
@@ -226,7 +246,7 @@ def _orbit_frame(states) -> np.ndarray:
 def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
     """Push nodes out of the neighbourhood of attractors, where no scheme can start."""
     for attractor in attractors:
-        center = np.zeros(len(q0)) if attractor.center is None else np.array(attractor.center)
+        center = _center(attractor, len(q0))
         offset = path - center
         distance = np.linalg.norm(offset, axis=1, keepdims=True)
         least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))

@@ -78,7 +78,7 @@ class TransferProblem:
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
         if self.objective.metered:
-            object.__setattr__(self, "actuator", self.actuator.metered())
+            object.__setattr__(self, "actuator", self.actuator.metered(self.dimension))
         self._complete_ends()
         if self.start.dimension != self.goal.dimension:
             raise ValueError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -95,7 +96,8 @@ def _rate(history: list[tuple[int, float]], claimed: int) -> float:
     if len(history) < 2:
         return float(claimed)
     (few, before), (many, after) = history[-2:]
-    return min(max(float(np.log(before / after) / np.log(many / few)), 1.0), float(claimed))
+    seen = math.log(before / max(after, 1e-300)) / math.log(many / few)
+    return min(max(seen, 1.0), float(claimed))
 
 
 def _words(path: Guess, reason: str, corners: np.ndarray) -> str:

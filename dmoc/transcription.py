@@ -60,7 +60,7 @@ class NLP:
         same = {
             "dimension": problem.dimension == old.dimension,
             "effects": problem.effects == old.effects,
-            "actuator": type(problem.actuator) is type(old.actuator),
+            "actuator": problem.actuator.structure == old.actuator.structure,
             "objective": problem.objective == old.objective,
             "constraints": kinds(problem.constraints) == kinds(old.constraints),
             "free duration": problem.free_duration == old.free_duration,

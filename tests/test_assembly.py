@@ -202,9 +202,6 @@ def test_another_problem_is_refused_by_the_name_of_the_change(what):
         nlp.accepts(CHANGES[what])
 
 
-@pytest.mark.xfail(
-    strict=True, reason="only the types of actuators are compared, not what is baked into the graph"
-)
 @pytest.mark.parametrize(
     "old, new",
     [

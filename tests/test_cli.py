@@ -325,7 +325,6 @@ def test_simulate_coasts_and_says_how_energy_drifts(run):
     assert "energy change" in run("simulate", "drone_hop")[1]
 
 
-@pytest.mark.xfail(strict=True, reason="the solver's iteration callback is deleted before Ipopt calls it")
 def test_a_terminal_sees_one_live_line_and_a_pipe_sees_none():
     """On a terminal the iterations are redrawn on one line of stderr; stdout stays the same."""
     command = [sys.executable, "-m", "dmoc.cli", "solve", "free_flyer"]

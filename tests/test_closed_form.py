@@ -172,11 +172,6 @@ def test_singular_arc_has_the_known_cost(singular):
     assert singular.objective == pytest.approx(0.376991930288, abs=1e-4)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the cost looks at the velocities of the path, which do not see a held force that alternates from "
-    "step to step; velocities from the momenta at the step ends do, and then the variation is 0.37",
-)
 def test_held_forces_do_not_chatter_on_a_singular_arc(singular):
     after = singular.end_times[:-1] > 1.45
     assert np.abs(np.diff(singular.force[after, 0])).sum() < 1.2 * 0.39
