@@ -258,7 +258,7 @@ def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet=False
     else:
         console.print(report.failure(solution, quiet, written))
     if not solution.success:
-        raise typer.Exit(NOT_SOLVED)
+        raise typer.Exit(INTERRUPTED if solution.status == "stopped" else NOT_SOLVED)
     raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
 
 
@@ -273,9 +273,9 @@ def _fail(message: str, code: int) -> NoReturn:
 
 @contextmanager
 def _ends_at_once() -> Iterator[None]:
-    """CasADi swallows a KeyboardInterrupt inside a solve and the solve goes on: here it ends the program.
+    """Outside a solve, which stops at Ctrl-C and keeps its iterate, it ends the program.
 
-    Nothing is being written here, so nothing is left behind.
+    CasADi would swallow the exception. Nothing is being written here, so nothing is left behind.
     """
 
     def end(number: int, frame: Any) -> NoReturn:

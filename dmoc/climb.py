@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.ipopt import Answer, Progress, Watch, make_solver, path_of, run, worst_rows
+from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run, worst_rows
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
@@ -42,6 +42,7 @@ class Climb:
     ):
         self.problem, self.options, self.progress = problem, options, progress
         self.dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+        self.interrupt = Interrupt()
         self.levels: list[Level] = []
         self.nlp: NLP
         self.answer: Answer
@@ -77,17 +78,19 @@ class Climb:
         return warm and self._attempt(replace(guess, multipliers={}), rounding)
 
     def _attempt(self, guess: Guess, rounding: float | None) -> bool:
+        if self.interrupt.seen and self.levels:
+            self.answer = replace(self.answer, status="stopped")
+            return False
         begun = time.perf_counter()
         problem = self.problem
         if rounding is not None:
             engine: Any = problem.actuator
             problem = replace(problem, actuator=replace(engine, smoothing=rounding))
         self.nlp = transcribe_onto(problem, guess, units_of(problem, guess))
-        watch = Watch(self.nlp, self.progress)
+        watch = Watch(self.nlp, self.progress, self.interrupt)
         solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch)
         built = time.perf_counter() - begun
-        with watch:
-            answer = self.answer = run(solver, self.nlp, problem, guess)
+        answer = self.answer = run(solver, self.nlp, problem, guess)
         steps, objective = len(guess.mesh) - 1, self.nlp.objective(answer.objective)
         self.levels.append(
             Level(guess.order, steps, answer.iterations, objective, built, answer.seconds, answer.status)

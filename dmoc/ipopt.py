@@ -163,29 +163,35 @@ def worst_rows(nlp: NLP, problem: TransferProblem, x, g, count: int = 10) -> tup
     return tuple((name, float(both[i])) for name, i in zip(names, worst, strict=True) if both[i] > 0)
 
 
+class Interrupt:
+    """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate is worth keeping."""
+
+    def __init__(self) -> None:
+        self.seen, self._previous = False, None
+
+    def __enter__(self) -> Interrupt:
+        if threading.current_thread() is threading.main_thread():
+            self._previous = signal.signal(signal.SIGINT, self._see)
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def _see(self, *received: Any) -> None:
+        self.seen = True
+
+
 class Watch(ca.Callback):
-    """Follows the iterations: tells `progress` about each, and stops at Ctrl-C with the iterate kept.
+    """Follows the iterations: tells `progress` about each, and stops when `interrupt` has seen a Ctrl-C.
 
     CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs.
     """
 
-    def __init__(self, nlp: NLP, progress: Progress | None = None):
+    def __init__(self, nlp: NLP, progress: Progress | None, interrupt: Interrupt):
         ca.Callback.__init__(self)
-        self.nlp, self.progress, self.iteration, self.interrupted = nlp, progress, 0, False
+        self.nlp, self.progress, self.interrupt, self.iteration = nlp, progress, interrupt, 0
         self.construct("watch", {})
-
-    def __enter__(self) -> Watch:
-        self.previous = None
-        if threading.current_thread() is threading.main_thread():
-            self.previous = signal.signal(signal.SIGINT, self._interrupt)
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if self.previous is not None:
-            signal.signal(signal.SIGINT, self.previous)
-
-    def _interrupt(self, *signal: Any) -> None:
-        self.interrupted = True
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -202,7 +208,7 @@ class Watch(ca.Callback):
         return ca.Sparsity.dense(sizes.get(ca.nlpsol_out(i), self.nlp.assembly.p.numel()))
 
     def eval(self, arguments: list) -> list:
-        stop = self.interrupted
+        stop = self.interrupt.seen
         if self.progress is not None:
             at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
             x, g = np.array(at["x"]), np.array(at["g"])

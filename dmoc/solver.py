@@ -69,10 +69,14 @@ def solve(
     if tol is not None:
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
-        return climb_to_tolerance(climb, _tolerance(tol), order, steps, hold, guess)
+        tol = _tolerance(tol)
+        with climb.interrupt:
+            return climb_to_tolerance(climb, tol, order, steps, hold, guess)
     order = 2 if order is None else order
     ends = check_mesh(DEFAULT_STEPS[order] if steps is None else steps, mesh)
-    climb.up_to(starting_guess(problem, ends, order, hold, guess))
+    first = starting_guess(problem, ends, order, hold, guess)
+    with climb.interrupt:
+        climb.up_to(first)
     return climb.solution()
 
 
