@@ -42,6 +42,7 @@ _HOMES = {
         "three_body",
     ),
     "dmoc.engines": ("Engine", "Nozzles"),
+    "dmoc.exporting": ("export",),
     "dmoc.objectives": (
         "Effort",
         "FinalHeight",

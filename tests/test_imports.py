@@ -79,12 +79,18 @@ MAY_IMPORT = {
     "library": "docstrings problem",
     "study": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
     "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "export": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
+    # what leaves the package
+    "export_functions": "BASICS mechanics problem",
+    "export_residual": "export_functions simulate",
+    "export_numbers": "BASICS problem transcription export_functions",
+    "export_solver": "BASICS NLP export_functions export_residual export_numbers",
+    "export_code": "export_functions export_solver",
+    "exporting": "__init__ BASICS NLP solver export_functions export_residual export_solver export_code",
     "plot_style": "BASICS mesh solution",
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verify plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study sweep export",
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study sweep exporting",
 }
 
 # one of each pair imports the other inside a function, when it is asked for

@@ -1,0 +1,191 @@
+"""The solver of an NLP as one CasADi function in SI units: states, limits and a warm start in, a plan out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.export_functions import TERMS, Exported, Scene, Term, named
+from dmoc.export_numbers import Numbers
+from dmoc.export_residual import path_symbols, residual_of, velocities_of
+from dmoc.guess import starting_guess
+from dmoc.ipopt import Answer, make_solver, path_of
+from dmoc.mesh import Guess
+from dmoc.transcription import NLP
+
+
+@dataclass(frozen=True)
+class Planner:
+    """An NLP and what its solver needs to speak SI units."""
+
+    scene: Scene
+    nlp: NLP
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        return Numbers(self.nlp)
+
+    @cached_property
+    def first_guess(self) -> Guess:
+        return starting_guess(self.scene.problem, self.nlp.mesh, self.nlp.scheme.order, self.scene.hold)
+
+    @cached_property
+    def multipliers(self) -> dict[str, np.ndarray]:
+        """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
+        columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
+        answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0.0)
+        found = path_of(self.nlp, self.scene.problem, answer).multipliers
+        return {_multiplier_name(key, list(found)): value.T for key, value in found.items() if value.size}
+
+    @property
+    def plan_names(self) -> list[str]:
+        """What a plan consists of, beside multipliers."""
+        more = ["masses"] * self.scene.burns + ["duration"] * self.scene.problem.free_duration
+        return ["positions", "velocities", "forces", *more]
+
+    def pack(self, plan: dict[str, Any]) -> ca.MX:
+        """Scaled unknowns."""
+        parts = {
+            "position": lambda: plan["positions"] - ca.DM(self.nlp.units.origin),
+            "force": lambda: plan["forces"],
+            "mass": lambda: plan["masses"],
+            "start.velocity": lambda: plan["velocities"][:, 0],
+            "goal.velocity": lambda: plan["velocities"][:, -1],
+            "duration": lambda: plan["duration"],
+        }
+        values = [ca.vec(parts[group.name]()) for group in self.nlp.columns.groups]
+        return ca.vertcat(*values) / ca.DM(self.nlp.columns.scales())
+
+    def unpack(self, x: ca.MX, numbers: dict[str, ca.MX]) -> dict[str, ca.MX]:
+        """What the residual of a path is made of, from scaled unknowns."""
+        groups = self.nlp.columns.groups
+        pieces = ca.vertsplit(x * ca.DM(self.nlp.columns.scales()), [0, *(group.stop for group in groups)])
+        found = {
+            group.name: ca.reshape(piece, len(group.labels), group.count)
+            for group, piece in zip(groups, pieces, strict=True)
+        }
+        mass = {"masses": found["mass"]} if self.scene.burns else {"mass": numbers["mass"]}
+        return mass | {
+            "positions": found["position"] + ca.DM(self.nlp.units.origin),
+            "start_velocity": found["start.velocity"],
+            "goal_velocity": found["goal.velocity"],
+            "forces": found["force"],
+            "start_time": numbers["start_time"],
+            "duration": found["duration"] if "duration" in found else numbers["duration"],
+        }
+
+
+def _multiplier_name(key: str, keys: list[str]) -> str:
+    """multipliers_goal_speed from end:row:goal.speed; with its kind where two groups have one name."""
+    kind, _, name = key.split(":")
+    twins = [other for other in keys if other.split(":")[2] == name]
+    return f"multipliers_{name.replace('.', '_')}" + (f"_{kind}" if len(twins) > 1 else "")
+
+
+def cost(planner: Planner) -> Exported:
+    """The objective of a path."""
+    path, nlp = path_symbols(planner.scene), planner.nlp
+    ends = ca.horzcat(path["start_velocity"], path["goal_velocity"])
+    given = {name: symbol for name, symbol in planner.numbers.symbols().items() if name not in path} | path
+    _, _, p = planner.numbers.bounds_and_parameters(given)
+    f = nlp.objective(nlp.assembly.objective(planner.pack({**path, "velocities": ends}), p))  # type: ignore[arg-type]
+    whole = named("cost", given, {"cost": f})
+    used = {
+        name: symbol
+        for i, (name, symbol) in enumerate(given.items())
+        if name in path or whole.jac_sparsity(0, i).nnz()
+    }
+    values = [used[name] if name in used else planner.numbers.value(name) for name in given]
+    terms = planner.numbers.terms | {"cost": Term(_unit(planner), "the objective, in its own sign")}
+    return Exported(named("cost", used, {"cost": whole(*values)}), "the objective of a path", terms)
+
+
+def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Exported:
+    """The parametric solver, for a cold or for a warm start."""
+    nlp, scene = planner.nlp, planner.scene
+    numbers, plan = planner.numbers.symbols(), scene.symbols(*planner.plan_names)
+    multipliers = {name: ca.MX.sym(name, *one.shape) for name, one in planner.multipliers.items()}
+    lower, upper, p = planner.numbers.bounds_and_parameters(numbers)
+    _, _, row_lower, row_upper = nlp.bounds(scene.problem)
+    lam = [ca.vec(symbol / ca.DM(planner.multipliers[name])) for name, symbol in multipliers.items()]
+    lam_x, lam_g = ca.vertsplit(ca.vertcat(*lam), [0, nlp.columns.size, nlp.columns.size + nlp.rows.size])
+    found = make_solver(nlp, options, warm)(
+        x0=ca.fmin(ca.fmax(planner.pack(plan), lower), upper),
+        p=p,
+        lbx=lower,
+        ubx=upper,
+        lbg=row_lower,
+        ubg=row_upper,
+        lam_x0=lam_x,
+        lam_g0=lam_g,
+    )
+    path = planner.unpack(found["x"], numbers)
+    outputs = {name: path[name] for name in planner.plan_names if name in path}
+    outputs["velocities"] = velocities_of(scene, path)
+    outputs |= _multipliers_out(planner, ca.vertcat(found["lam_x"], found["lam_g"]))
+    outputs["objective"] = nlp.objective(found["f"])  # type: ignore[arg-type]
+    outputs["largest_residual"] = _largest(ca.fabs(ca.vec(residual_of(scene, path))))
+    beyond = [lower - found["x"], found["x"] - upper, row_lower - found["g"], found["g"] - row_upper]
+    outputs["violation"] = _largest(ca.vertcat(*beyond))
+    guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
+    name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of the positions")
+    function = named(name, numbers | guesses, outputs)
+    return Exported(function, f"Ipopt's solution of the transfer, {words}", _solver_terms(planner))
+
+
+def nominal(planner: Planner) -> Exported:
+    """What the problem itself states, and its own guess: inputs of the solver to begin with."""
+    guess = planner.first_guess
+    ends = np.linspace(guess.start_velocity, guess.goal_velocity, planner.scene.steps + 1)
+    plan: dict[str, Any] = {"positions": guess.position.T, "velocities": ends.T, "forces": guess.control.T}
+    plan |= {"masses": guess.mass[None], "duration": guess.duration}
+    values = {name: planner.numbers.value(name) for name in planner.numbers.names}
+    values |= {f"guess_{name}": ca.DM(plan[name]) for name in planner.plan_names}
+    values |= {f"guess_{name}": ca.DM.zeros(*one.shape) for name, one in planner.multipliers.items()}
+    outputs = {name: ca.MX(value) for name, value in values.items()}
+    words = "the problem's own numbers and its guess, named like the inputs of the solver"
+    return Exported(named("nominal", {}, outputs), words, _solver_terms(planner))
+
+
+def _multipliers_out(planner: Planner, lam: ca.MX) -> dict[str, ca.MX]:
+    names, ones = list(planner.multipliers), list(planner.multipliers.values())
+    pieces = ca.vertsplit(lam, np.cumsum([0, *(one.size for one in ones)]).tolist())
+    return {
+        name: ca.reshape(piece, *one.shape) * ca.DM(one)
+        for name, one, piece in zip(names, ones, pieces, strict=True)
+    }
+
+
+def _largest(values: ca.MX) -> ca.MX:
+    """The largest entry, at least 0; infinite where one is not a number, which a maximum would pass over."""
+    finite = ca.sumsqr(ca.fmax(values, 0)) < np.inf
+    return ca.if_else(
+        ca.logic_and(finite, ca.sumsqr(ca.fmin(values, 0)) >= 0), ca.mmax(ca.fmax(values, 0)), np.inf
+    )
+
+
+def _unit(planner: Planner) -> str:
+    problem = planner.scene.problem
+    return problem.objective.unit_with(problem.actuator)
+
+
+def _solver_terms(planner: Planner) -> dict[str, Term]:
+    unit = _unit(planner)
+    terms = {
+        "objective": Term(unit, "the objective, in its own sign"),
+        "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
+        "violation": Term("-", "largest violation of a row or bound, relative to its scale"),
+        "duration": Term("s", "duration found"),
+    }
+    for name in planner.multipliers:
+        words = (
+            f"multipliers of {name.removeprefix('multipliers_')}, per fraction of the duration where one a node"
+        )
+        terms[name] = Term(f"{unit or '1'} per unit of the row", words)
+    plan = {name: terms.get(name) or TERMS[name] for name in (*planner.plan_names, *planner.multipliers)}
+    guesses = {f"guess_{name}": Term(term.unit, f"guess: {term.words}") for name, term in plan.items()}
+    return planner.numbers.terms | terms | guesses
