@@ -113,28 +113,29 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     _, _, row_lower, row_upper = nlp.bounds(scene.problem)
     lam = [ca.vec(symbol / ca.DM(planner.multipliers[name])) for name, symbol in multipliers.items()]
     lam_x, lam_g = ca.vertsplit(ca.vertcat(*lam), [0, nlp.columns.size, nlp.columns.size + nlp.rows.size])
-    found = make_solver(nlp, options, warm)(
-        x0=ca.fmin(ca.fmax(planner.pack(plan), lower), upper),
-        p=p,
-        lbx=lower,
-        ubx=upper,
-        lbg=row_lower,
-        ubg=row_upper,
-        lam_x0=lam_x,
-        lam_g0=lam_g,
-    )
-    path = planner.unpack(found["x"], numbers)
-    outputs = {name: path[name] for name in planner.plan_names if name in path}
-    outputs["velocities"] = velocities_of(scene, path)
-    outputs |= _multipliers_out(planner, ca.vertcat(found["lam_x"], found["lam_g"]))
-    outputs["objective"] = nlp.objective(found["f"])  # type: ignore[arg-type]
-    outputs["largest_residual"] = _largest(ca.fabs(ca.vec(residual_of(scene, path))))
+    bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
+    x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
+    found = make_solver(nlp, options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
     beyond = [lower - found["x"], found["x"] - upper, row_lower - found["g"], found["g"] - row_upper]
-    outputs["violation"] = _largest(ca.vertcat(*beyond))
+    outputs = _plan_of(planner, numbers, found)
+    outputs["violation"] = _largest(ca.vertcat(*beyond), ca.vertcat(found["x"], found["g"]))
     guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
     name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of the positions")
     function = named(name, numbers | guesses, outputs)
     return Exported(function, f"Ipopt's solution of the transfer, {words}", _solver_terms(planner))
+
+
+def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX]) -> dict[str, ca.MX]:
+    """What a solve gave, in SI units; the residual is found anew from the path."""
+    path = planner.unpack(found["x"], numbers)
+    path["velocities"] = velocities_of(planner.scene, path)
+    residual = ca.vec(residual_of(planner.scene, path))
+    return {
+        **{name: path[name] for name in planner.plan_names},
+        **_multipliers_out(planner, ca.vertcat(found["lam_x"], found["lam_g"])),
+        "objective": planner.nlp.objective(found["f"]),  # type: ignore[arg-type, dict-item]
+        "largest_residual": _largest(ca.fabs(residual), residual),
+    }
 
 
 def nominal(planner: Planner) -> Exported:
@@ -160,12 +161,9 @@ def _multipliers_out(planner: Planner, lam: ca.MX) -> dict[str, ca.MX]:
     }
 
 
-def _largest(values: ca.MX) -> ca.MX:
-    """The largest entry, at least 0; infinite where one is not a number, which a maximum would pass over."""
-    finite = ca.sumsqr(ca.fmax(values, 0)) < np.inf
-    return ca.if_else(
-        ca.logic_and(finite, ca.sumsqr(ca.fmin(values, 0)) >= 0), ca.mmax(ca.fmax(values, 0)), np.inf
-    )
+def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
+    """The largest value, at least 0; infinite if what is to be finite is not: a maximum passes over NaN."""
+    return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 
 
 def _unit(planner: Planner) -> str:

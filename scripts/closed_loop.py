@@ -1,0 +1,149 @@
+"""Fly the free flyer with an exported solver that plans again once a second, as a robot would.
+
+The solver is exported and built once; from then on CasADi alone is used. Every plan starts where the robot
+is, has the time that is left, and is warm started from the plan before, moved on, multipliers included. The
+robot is heavier than the planner believes and is pushed about; it moves in steps of 20 ms.
+
+    ./scripts/run python scripts/closed_loop.py --plot closed_loop.png
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import casadi as ca
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from dmoc import export
+from dmoc.library import load_problem
+
+STEPS, PERIOD, TICK = 40, 1.0, 0.02
+LAST_PLAN = 2.0  # no new plan when less time than this is left [s]
+MASS_ERROR = 1.08  # true mass over the one the planner believes
+MARGIN = 0.05  # added to the obstacles' radius: plans keep clear of them at nodes only [m]
+GOOD = {"largest_residual": 1e-6, "violation": 1e-6}  # of a plan to be flown [N], [-]
+
+
+def push_at(t: float, noise: np.random.Generator) -> np.ndarray:
+    """What nobody told the planner about [N]: a draught, a slow swing and gusts."""
+    swing = np.sin(2 * np.pi * t / np.array([11.0, 7.0, 17.0]))
+    return np.array([-0.012, 0.015, 0.008]) + 0.01 * swing + noise.normal(0.0, 0.02, 3)
+
+
+def moved_on(plan: dict, left: float, gone: float) -> dict:
+    """A plan for `left` seconds as the guess of the plan for what is left of them `gone` seconds later."""
+    places = {STEPS + 1: np.linspace(0, 1, STEPS + 1), STEPS: (np.arange(STEPS) + 0.5) / STEPS}
+    guess = {f"guess_{name}": np.array(value) for name, value in plan.items()}
+    for name, values in guess.items():
+        if (old := places.get(values.shape[1])) is not None:
+            new = (gone + old * (left - gone)) / left
+            # positions must stay smooth, their second differences are forces; multipliers must not overshoot
+            smooth = name in ("guess_positions", "guess_velocities", "guess_multipliers_dynamics")
+            linear = np.stack([np.interp(new, old, row) for row in values])
+            guess[name] = CubicSpline(old, values.T)(new).T if smooth else linear
+    return guess
+
+
+class Planner:
+    """The exported solvers, and how long they took."""
+
+    def __init__(self, folder: Path):
+        nominal, self.cold, self.warm, self.step = (
+            ca.Function.load(f"{folder}/{name}.casadi") for name in ("nominal", "solver", "warm_solver", "step")
+        )
+        self.inputs = {name: np.array(value) for name, value in nominal().items()}
+        self.mass, self.duration = self.inputs["mass"].item(), self.inputs["duration"].item()
+        names = [name.removesuffix("_radius") for name in self.inputs if name.endswith("_radius")]
+        self.centers = np.array([self.inputs[f"{name}_center"].ravel() for name in names])
+        self.radii = np.array([self.inputs[f"{name}_radius"].item() for name in names])
+        self.inputs |= {f"{name}_radius": self.inputs[f"{name}_radius"] + MARGIN for name in names}
+        self.seconds, self.iterations, self.refused = [], [], 0
+
+    def plan(self, q: np.ndarray, v: np.ndarray, left: float, guess: dict) -> dict | None:
+        """A plan from a state, or None if the solver has none that is good."""
+        solver = self.warm if guess else self.cold
+        state = {"start_position": q, "start_velocity": v, "duration": left}
+        begun = time.perf_counter()
+        plan = solver(**{**self.inputs, **state, **guess})
+        self.seconds.append(time.perf_counter() - begun)
+        self.iterations.append(solver.stats()["iter_count"])
+        good = all(float(plan[name]) <= limit for name, limit in GOOD.items())
+        self.refused += not good
+        return {name: x for name, x in plan.items() if f"guess_{name}" in self.inputs} if good else None
+
+
+def fly(planner: Planner, again: bool = True) -> tuple:
+    """Path [m] every tick, the last velocity [m/s], and the plans; with the first plan alone if not `again`."""
+    noise, duration, plan, since, plans = np.random.default_rng(1), planner.duration, None, 0.0, []
+    q, v = (planner.inputs[f"start_{name}"].ravel() for name in ("position", "velocity"))
+    path = [q]
+    for tick in range(round(duration / TICK)):
+        t = tick * TICK
+        if plan is None or (again and tick % round(PERIOD / TICK) == 0 and duration - t >= LAST_PLAN):
+            guess = moved_on(plan, duration - since, t - since) if plan else {}
+            if found := planner.plan(q, v, duration - t, guess):
+                plan, since = found, t
+                plans.append(np.array(plan["positions"]))
+            elif plan is None:
+                raise SystemExit("there is no first plan")
+        now = int((t + 0.5 * TICK - since) / (duration - since) * STEPS)
+        force = np.array(plan["forces"])[:, now] + push_at(t, noise)
+        q, v = (np.array(x).ravel() for x in planner.step(q, v, planner.mass * MASS_ERROR, t, TICK, force))
+        path.append(q)
+    return np.array(path), v, plans
+
+
+def draw(file: str, planner: Planner, path: np.ndarray, plans: list) -> None:
+    figure, axes = plt.subplots(2, 2, figsize=(11, 5.5), layout="constrained")
+    for panel, other, title in ((axes[0, 0], 1, "from above"), (axes[1, 0], 2, "from the side")):
+        for center, radius in zip(planner.centers, planner.radii, strict=True):
+            panel.add_patch(plt.Circle(center[[0, other]], radius, color="#CC79A7", alpha=0.35, lw=0))
+        for positions in plans[::4]:
+            panel.plot(positions[0], positions[other], color="#555555", lw=0.8)
+        panel.plot(path[:, 0], path[:, other], color="#0072B2", lw=2.5)
+        panel.set_title(f"{title}: flown (blue), every fourth plan (grey)")
+        panel.set(xlabel="x [m]", ylabel=f"{'xyz'[other]} [m]", aspect="equal", ylim=(-1.1, 2.2))
+    axes[0, 1].plot(np.arange(len(path)) * TICK, clearance_of(planner, path), color="#0072B2")
+    axes[0, 1].set(xlabel="time [s]", ylabel="clearance [m]", ylim=(0, None))
+    axes[1, 1].bar(np.arange(len(planner.seconds)), 1e3 * np.array(planner.seconds), color="#E69F00")
+    axes[1, 1].set(xlabel="time of the plan [s]; the first is a cold start", ylabel="time to plan [ms]")
+    figure.savefig(file, dpi=120)
+
+
+def clearance_of(planner: Planner, path: np.ndarray) -> np.ndarray:
+    return (np.linalg.norm(path[:, None] - planner.centers, axis=2) - planner.radii).min(axis=1)
+
+
+def report(planner: Planner, path: np.ndarray, v: np.ndarray) -> str:
+    miss = np.linalg.norm(path[-1] - planner.inputs["goal_position"].ravel())
+    nearest = clearance_of(planner, path).min()
+    return f"clearance {1e3 * nearest:.1f} mm, miss {1e3 * miss:.1f} mm and {1e3 * np.linalg.norm(v):.1f} mm/s"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--plot", help="draw the flight into this file")
+    file = parser.parse_args().plot
+    with tempfile.TemporaryDirectory() as work:
+        begun, folder = time.perf_counter(), Path(work) / "free_flyer"
+        export(load_problem("free_flyer").make(), folder, steps=STEPS, hold=True, c=False)
+        planner, built = Planner(folder), time.perf_counter() - begun
+    path, v, plans = fly(planner)
+    ms, count = 1e3 * np.array(planner.seconds), planner.iterations
+    print(f"built once, in {built:.2f} s, for {len(ms)} plans, {planner.refused} of them refused")
+    print(f"first plan, cold: {ms[0]:.1f} ms, {count[0]} iterations")
+    print(f"warm plans: median {np.median(ms[1:]):.1f} ms, 95 % {np.quantile(ms[1:], 0.95):.1f} ms,", end=" ")
+    print(f"max {ms[1:].max():.1f} ms; iterations median {np.median(count[1:]):.0f}, max {max(count[1:])}")
+    print("planning again:    ", report(planner, path, v))
+    if file:
+        draw(file, planner, path, plans)
+    print("the first plan only:", report(planner, *fly(planner, again=False)[:2]))
+    if clearance_of(planner, path).min() <= 0:
+        raise SystemExit("the robot touched an obstacle")
+
+
+if __name__ == "__main__":
+    main()
