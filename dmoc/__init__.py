@@ -56,11 +56,11 @@ _HOMES = {
     "dmoc.orbits": ("CircularOrbit", "Orbit"),
     "dmoc.problem": ("TransferProblem",),
     "dmoc.rows": ("Row",),
-    "dmoc.simulate": ("Trajectory", "simulate"),
+    "dmoc.simulation": ("Trajectory", "simulate"),
     "dmoc.solution": ("Solution", "SolveError", "load"),
     "dmoc.solver": ("solve",),
     "dmoc.transcription": ("NLP", "transcribe"),
-    "dmoc.verify": ("Report", "verify"),
+    "dmoc.verification": ("Report", "verify"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = sorted(_HOME_OF)

@@ -12,7 +12,7 @@ from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import node_weights, step_nodes
 from dmoc.problem import TransferProblem
-from dmoc.simulate import end_momenta, force_of, legendre_momenta, step_matrices
+from dmoc.simulation import end_momenta, force_of, legendre_momenta, step_matrices
 from dmoc.solution import Solution
 
 ROUNDING = 10 * np.finfo(float).eps

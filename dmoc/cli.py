@@ -16,7 +16,7 @@ import typer
 if TYPE_CHECKING:
     from dmoc.library import ProblemFile
     from dmoc.solution import Solution
-    from dmoc.verify import Report
+    from dmoc.verification import Report
 
 # Typer exports only one of its usage errors; this is the class of all of them.
 USAGE_ERROR: Any = typer.BadParameter.__base__
@@ -95,7 +95,7 @@ def solve(
     """Solve a problem, check the answer, show both."""
     import dmoc
     from dmoc import report
-    from dmoc.verify import verify
+    from dmoc.verification import verify
 
     _writable(out)
     _writable(plot, drawn=True)
@@ -132,7 +132,7 @@ def march(
     """March the integrator forward from the start, without optimisation."""
     import dmoc
     from dmoc import report
-    from dmoc.simulate import simulate
+    from dmoc.simulation import simulate
     from dmoc.transcription import check_mesh
 
     if steps is not None:
@@ -149,7 +149,7 @@ def march(
 @app.command(epilog="Example: dmoc check flight.nc")
 def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
-    from dmoc.verify import verify
+    from dmoc.verification import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
         solution = _attached(file, problem)

@@ -12,7 +12,7 @@ from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of,
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
-from dmoc.simulate import end_momenta, force_of
+from dmoc.simulation import end_momenta, force_of
 from dmoc.solution import Level, Provenance, Solution
 from dmoc.stability import flow_matrices, refuse_unstable
 from dmoc.transcription import NLP, transcribe_onto, units_of

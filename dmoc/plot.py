@@ -35,7 +35,7 @@ from dmoc.solution import Solution
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from dmoc.verify import Report
+    from dmoc.verification import Report
 
 SUFFIXES = (".png", ".pdf", ".svg")
 SQUARED = "\u00b2"

@@ -14,7 +14,7 @@ from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map
 from dmoc.mesh import Guess, step_nodes, uniform_mesh
 from dmoc.problem import TransferProblem
-from dmoc.simulate import end_momenta, reference
+from dmoc.simulation import end_momenta, reference
 from dmoc.solution import Error, Solution
 from dmoc.transcription import check_mesh
 

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from dmoc.effects.base import Effect
     from dmoc.library import Parameter
     from dmoc.problem import TransferProblem
-    from dmoc.simulate import Trajectory
+    from dmoc.simulation import Trajectory
     from dmoc.solution import Solution
     from dmoc.transcription import NLP
-    from dmoc.verify import Report
+    from dmoc.verification import Report
 
 # Width of what is written to a file or a pipe, where no terminal gives one.
 PLAIN_WIDTH = 120

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, state_symbols
 from dmoc.mesh import Guess
-from dmoc.simulate import step_matrices
+from dmoc.simulation import step_matrices
 
 # Frozen along a path the two differ by what the path changes within a step; where the linearisation is
 # constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.

@@ -19,7 +19,7 @@ from dmoc import (
     TransferProblem,
     solve,
 )
-from dmoc.verify import verify
+from dmoc.verification import verify
 
 
 def line(place, speed):

@@ -101,7 +101,7 @@ def test_json_stays_pure_when_the_problem_file_prints(run, folder):
 
 def test_numbers_that_are_not_finite_become_null():
     from dmoc.report import as_json, result
-    from dmoc.verify import Check, Report
+    from dmoc.verification import Check, Report
 
     class Diverged:
         problem = type("Problem", (), {"name": "p"})

@@ -15,7 +15,7 @@ from dmoc import (
     UniformGravity,
     Wind,
 )
-from dmoc.simulate import simulate
+from dmoc.simulation import simulate
 
 EARTH, RADIUS = 3.986004418e14, 6.378137e6
 SEA_LEVEL = UniformAtmosphere(1.225)

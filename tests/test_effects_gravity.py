@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dmoc import J2, PointGravity, State, TransferProblem
-from dmoc.simulate import simulate
+from dmoc.simulation import simulate
 
 MU, RADIUS, OBLATENESS = 3.986004418e14, 6.378137e6, 1.08262668e-3
 EARTH = (PointGravity(MU), J2(MU, RADIUS, OBLATENESS))

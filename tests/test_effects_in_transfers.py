@@ -29,7 +29,7 @@ from dmoc import (
     tabulated_motion,
 )
 from dmoc.mechanics import Dynamics, split_effects
-from dmoc.verify import verify
+from dmoc.verification import verify
 
 MU, RADIUS = 3.986004418e14, 6.378137e6
 MOON = circular_motion(3.844e8, 2.66e-6, 0.3, 0.4)

@@ -13,7 +13,7 @@ from dmoc import (
     TransferProblem,
     circular_motion,
 )
-from dmoc.simulate import simulate
+from dmoc.simulation import simulate
 
 AU, SUN, SUN_MU, RADIUS = 149_597_870_700.0, 6.957e8, 1.32712440018e20, 6.378137e6
 FAR = (AU, 0.0, 0.0)

@@ -18,7 +18,7 @@ from dmoc import (
     tabulated_motion,
     three_body,
 )
-from dmoc.simulate import simulate
+from dmoc.simulation import simulate
 
 MU = 1.32712440018e20
 

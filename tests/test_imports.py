@@ -21,9 +21,9 @@ GROUPS = {
     "effects.motion effects.third_body",
     "PARTS": "actuators engines objectives constraints boundary elements orbits",
     "NLP": "problem mechanics mesh assembly blocks guess transcription ipopt",
-    "MOTION": "reference simulate stability",
+    "MOTION": "reference simulation stability",
     "ANSWER": "solution results climb refine solver",
-    "VERDICT": "case limits optimality verify",
+    "VERDICT": "case limits optimality verification",
 }
 
 MAY_IMPORT = {
@@ -58,10 +58,12 @@ MAY_IMPORT = {
     "assembly": "",
     # motion forward in time; the guess and the refinement may use it
     "reference": "lobatto mechanics mesh",
-    "simulate": "checks lobatto mechanics mesh problem reference",
-    "stability": "lobatto mechanics mesh simulate",
+    "simulation": "checks lobatto mechanics mesh problem reference",
+    "stability": "lobatto mechanics mesh simulation",
     # the way from a problem to a solution
-    "guess": "BASICS EFFECTS boundary mechanics mesh problem MOTION",
+    "spiral": "",
+    "coasting": "EFFECTS boundary mechanics problem spiral",
+    "guess": "BASICS coasting mechanics mesh problem simulation",
     "blocks": "BASICS assembly mechanics mesh problem",
     "transcription": "BASICS assembly blocks guess mechanics mesh problem",
     "ipopt": "BASICS mesh problem transcription",
@@ -71,24 +73,24 @@ MAY_IMPORT = {
     "refine": "BASICS NLP MOTION solution climb",
     "solver": "BASICS NLP MOTION solution climb refine",
     # what is judged: never with the solver's own words
-    "case": "BASICS mechanics mesh problem simulate solution",
+    "case": "BASICS mechanics mesh problem simulation solution",
     "limits": "BASICS case mechanics",
     "optimality": "BASICS NLP case",
-    "verify": "BASICS NLP MOTION solution case limits optimality",
+    "verification": "BASICS NLP MOTION solution case limits optimality",
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
     "study": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
     "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     # what leaves the package
     "export_functions": "BASICS mechanics problem",
-    "export_residual": "export_functions simulate",
+    "export_residual": "export_functions simulation",
     "export_numbers": "BASICS problem transcription export_functions",
     "export_solver": "BASICS NLP export_functions export_residual export_numbers",
     "export_code": "export_functions export_solver",
     "exporting": "__init__ BASICS NLP solver export_functions export_residual export_solver export_code",
     "plot_style": "BASICS mesh solution",
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
-    "plot": "BASICS EFFECTS PARTS NLP solution verify plot_style plot_path",
+    "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study sweep exporting",
 }
@@ -188,3 +190,11 @@ def test_the_front_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
+    """Importing a submodule binds its name on the package, over the function of the same name."""
+    import dmoc
+
+    modules = {path.stem for path in PACKAGE.glob("*.py")} | {"effects"}
+    assert not modules & set(dmoc.__all__)

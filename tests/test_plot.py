@@ -27,7 +27,7 @@ from dmoc import (
 )
 from dmoc.plot import figure, save_figure
 from dmoc.plot_style import readable, within_steps
-from dmoc.verify import Check, Report
+from dmoc.verification import Check, Report
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -8,7 +8,7 @@ from scipy.optimize import root
 
 from dmoc import solve
 from dmoc.library import catalogue, load_problem
-from dmoc.verify import verify
+from dmoc.verification import verify
 
 
 def make(name, **values):

@@ -23,7 +23,7 @@ from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, node_fractions, node_weights, uniform_mesh
 from dmoc.reference import reference
-from dmoc.simulate import simulate
+from dmoc.simulation import simulate
 
 ORDERS = [2, 4, 6, 8]
 REST = State((0, 0), (0, 0))

@@ -34,8 +34,8 @@ from dmoc.library import load_problem
 from dmoc.limits import excesses
 from dmoc.mechanics import Dynamics
 from dmoc.optimality import stationarity
-from dmoc.simulate import end_momenta, force_of
-from dmoc.verify import verify
+from dmoc.simulation import end_momenta, force_of
+from dmoc.verification import verify
 
 CHECKS = ["residual", "rollout", "reference", "ledger", "bounds", "optimality", "stability"]
 

@@ -1,0 +1,253 @@
+"""Forward integration of the same scheme."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.checks import number
+from dmoc.lobatto import scheme
+from dmoc.mechanics import Dynamics, step_map, step_momenta
+from dmoc.mesh import Guess, node_fractions, step_nodes, uniform_mesh
+from dmoc.problem import TransferProblem
+from dmoc.reference import reference as reference
+
+
+def end_momenta(
+    dynamics: Dynamics, path: Guess, start_time: float, momenta: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
+
+    The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
+    end what arrives there. `momenta` are the `legendre_momenta` if they are known.
+    """
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    if momenta is None:
+        momenta = legendre_momenta(dynamics, path, start_time)
+    p = np.concatenate([-momenta[0], momenta[-1][-1:]])
+    times = start_time + path.duration * path.mesh
+    v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
+    return p, np.array(v).T.reshape(-1, n)
+
+
+def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    at = step_nodes(steps, rule)
+    origin = path.position[0]
+
+    def stacked(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values[at[j]].T for j in range(rule.degree + 1)])
+
+    control = path.control.T if path.hold else stacked(path.control)
+    times = (start_time + path.duration * path.mesh[:-1])[None]
+    function = legendre_function(dynamics, path.order, path.hold)
+    lengths = path.duration * np.diff(path.mesh)[None]
+    momenta = function(stacked(path.position - origin), path.mass[at], control, times, lengths, origin)
+    return np.array([np.array(momentum).T.reshape(steps, n) for momentum in momenta])
+
+
+def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(q, m, u, t, h, origin) -> P_0 .. P_s [m/s] of one step, whole: effects, kinetic energy and actuator.
+
+    q are the s + 1 positions stacked, from `origin` [m]; u the controls of the nodes stacked, or of the step.
+    """
+    rule, n = scheme(order), dynamics.dimension
+    size = dynamics.actuator.size(n)
+    q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
+    u = ca.SX.sym("u", size * (1 if hold else rule.degree + 1))
+    t, h, origin = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("origin", n)
+    push = [
+        dynamics.actuator.force(u[:size] if hold else u[size * j : size * (j + 1)]) / m[j]
+        for j in range(rule.degree + 1)
+    ]
+
+    def point(t, r, v, m):
+        return dynamics.point(t, r + origin, v, m)
+
+    momenta = step_momenta(rule, point, t, h, ca.vertsplit(q, n), ca.vertsplit(m), push)
+    return ca.Function("legendre", [q, m, u, t, h, origin], momenta)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A path found by forward integration, at the step ends; SI units, one row an end.
+
+    Attributes
+    ----------
+    time : array, shape (steps+1,)
+        [s].
+    position, velocity : arrays, shape (steps+1, axes)
+        [m], [m/s].
+    momentum : array, shape (steps+1, axes)
+        dl/dv, per unit mass [m/s].
+    mass : array, shape (steps+1,)
+        [kg].
+    energy : array, shape (steps+1,)
+        v . dl/dv - l, per unit mass [J/kg].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    momentum: np.ndarray
+    mass: np.ndarray
+    energy: np.ndarray
+
+
+def simulate(
+    problem: TransferProblem,
+    controls: Any = None,
+    steps: int | None = None,
+    order: int = 2,
+    hold: bool = False,
+    duration: float | None = None,
+) -> Trajectory:
+    """Integrate a scene forward from its start with the variational scheme.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+        Its start must be a state without free entries.
+    controls : Solution or array, optional
+        A solution, whose mesh, order and controls are then used, or controls of shape
+        (steps*s+1, size), with hold (steps, size); nothing for a coast.
+    steps, order, hold
+        As in `solve`, if `controls` is not a solution.
+    duration : float, optional
+        [s], if it is not the problem's.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ValueError
+        If the start is not fixed, or the controls do not fit the mesh.
+    """
+    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    position, velocity = problem.start.fixed()
+    if np.isnan(position).any() or np.isnan(velocity).any():
+        raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
+    path = getattr(controls, "path", None)
+    if path is None:
+        path = _given_path(problem, controls, steps, order, hold, duration)
+    elif path.position.shape[1:] + path.control.shape[1:] != (
+        problem.dimension,
+        problem.actuator.size(problem.dimension),
+    ):
+        raise ValueError("the solution has another dimension or other controls than the problem")
+    path = replace(path, mass=node_masses(dynamics, path, problem.mass))
+    time = problem.start_time + path.duration * path.mesh
+    mass = path.mass[:: scheme(path.order).degree]
+    momentum = dynamics.point(time[0], position, velocity, mass[0])[1]
+    q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel())
+    v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
+    energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
+    return Trajectory(time, q, v, p, mass, energy)
+
+
+def _given_path(
+    problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
+) -> Guess:
+    """Controls on a mesh, checked, as a path that stays at the start."""
+    if steps is not None and (isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1):
+        raise ValueError(f"steps must be a whole number of at least 1; got {steps!r}")
+    mesh = uniform_mesh(400 if steps is None else int(steps))
+    nodes = len(node_fractions(mesh, scheme(order)))
+    shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
+    given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+    if given.shape != shape:
+        raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(
+            f"controls must be finite; row {int(np.argmin(np.isfinite(given).all(axis=1)))} is not"
+        )
+    longest = (
+        problem.duration_bounds[1] if duration is None else number("duration", duration, "s", positive=True)
+    )
+    position, velocity = problem.start.fixed()
+    mass = np.full(nodes, problem.mass)
+    return Guess(mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity)
+
+
+def node_masses(dynamics: Dynamics, path: Guess, mass: float) -> np.ndarray:
+    """Masses of the nodes [kg], shape (nodes,), from that at the start and the controls of a path.
+
+    m_i = m_0 - h sum_j A_ij flow_j with the Lobatto IIIA matrix A, as in the transcription.
+    """
+    rule, at = scheme(path.order), step_nodes(len(path.mesh) - 1, scheme(path.order))
+    masses = np.full(at[-1, -1] + 1, float(mass))
+    if not dynamics.actuator.burns:
+        return masses
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    flow = ca.Function("flow", [u], [ca.densify(dynamics.actuator.flow(u))])(path.control.T).full().ravel()
+    h = path.duration * np.diff(path.mesh)
+    burnt = h * (rule.integral @ (np.tile(flow, (rule.degree + 1, 1)) if path.hold else flow[at]))
+    before = np.concatenate([[0.0], np.cumsum(burnt[-1])])
+    masses[at] -= before[:-1] + burnt
+    masses[-1] = mass - before[-1]
+    return masses
+
+
+def rollout(
+    dynamics: Dynamics, path: Guess, start_time: float, position: np.ndarray, momentum: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] and momenta per mass [m/s] at the step ends, of shape (steps+1, axes), from the start.
+
+    Only the mesh, masses and controls of `path` are used, and its first position as the origin.
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    advance, inputs = _advance(dynamics, path, start_time)
+    march = advance.mapaccum(steps)
+    start = np.concatenate([position - path.position[0], momentum])
+    states = np.concatenate([start[:, None], np.array(march(start, *inputs))], axis=1).T
+    return states[:, :n] + path.position[0], states[:, n:]
+
+
+def step_matrices(dynamics: Dynamics, path: Guess, start_time: float, momentum: np.ndarray) -> np.ndarray:
+    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
+
+    `momentum` are the momenta per mass at the step ends, shape (steps+1, axes) [m/s].
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    advance, inputs = _advance(dynamics, path, start_time)
+    given = advance.mx_in()
+    tangent = ca.Function("tangent", given, [ca.densify(ca.jacobian(advance(*given), given[0]))])
+    if advance.is_a("SXFunction"):
+        tangent = tangent.expand()
+    ends = path.position[:: scheme(path.order).degree] - path.position[0]
+    states = np.concatenate([ends[:-1], momentum[:-1]], axis=1).T
+    matrices = np.array(tangent.map(steps)(states, *inputs))
+    return matrices.reshape(2 * n, steps, 2 * n).transpose(1, 0, 2)
+
+
+def _advance(dynamics: Dynamics, path: Guess, start_time: float) -> tuple[ca.Function, list]:
+    """(state, m, u, t, h) -> the state one step later, and its inputs for all steps side by side."""
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    at = step_nodes(steps, rule)
+    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
+    times = start_time + path.duration * path.mesh[:-1]
+    lengths = path.duration * np.diff(path.mesh)
+    if np.array_equal(path.mesh, uniform_mesh(steps)):
+        # fractions differ by round-off, 1e-12 of a step in 20,000: steps must be equal to keep the energy
+        lengths[:] = path.duration / steps
+    inputs = [path.mass[at], control.T, times[None], lengths[None]]
+    given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
+    state = ca.MX.sym("state", 2 * n)
+    increments = step_map(dynamics, rule, path.hold)(state[:n], state[n:], *given, path.position[0])
+    advance = ca.Function("advance", [state, *given], [state + ca.vertcat(*increments[:2])])
+    # an explicit step has no root to find: as one plain expression it is three times as fast
+    explicit = rule.degree == 1 and not dynamics.depends_on_velocity
+    return advance.expand() if explicit else advance, inputs
+
+
+def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
+    """Force [N] of controls, one row each."""
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
+    return np.array(force(control.T)).T.reshape(len(control), dynamics.dimension)
