@@ -196,5 +196,5 @@ def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
     """Importing a submodule binds its name on the package, over the function of the same name."""
     import dmoc
 
-    modules = {path.stem for path in PACKAGE.glob("*.py")} | {"effects"}
+    modules = {path.stem for path in ROOT.glob("*.py")} | {"effects"}
     assert not modules & set(dmoc.__all__)
