@@ -181,6 +181,33 @@ def plot(
     report.console().print(f"wrote {target}")
 
 
+@app.command("export", epilog="Example: dmoc export free_flyer planner --steps 40 --hold")
+def take_away(
+    problem: Name,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder, or one of an earlier export.")],
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    no_c: Annotated[bool, typer.Option("--no-c", help="Leave out the C code.")] = False,
+) -> None:
+    """Write integrator, residual and solver of a problem as CasADi files and C code.
+
+    They need CasADi alone, the C code nothing. A .casadi file is code: load only those you trust.
+    """
+    import json
+
+    import dmoc
+    from dmoc import report
+
+    _, case = _problem(problem, settings)
+    paths = dmoc.export(case, folder, 2 if order is None else order, steps, hold, c=not no_c)
+    functions = json.loads(paths[0].read_text())["functions"]
+    console = report.console()
+    console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
+    console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
+
+
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; every bad input becomes one line on stderr and exit code 2."""
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
