@@ -235,6 +235,14 @@ def test_ledger_fails_alone_on_a_false_report(orbit, what):
     assert failing(verify(replace(orbit, **{what: getattr(orbit, what)[:-1]}))) == ["ledger"]
 
 
+def test_ledger_fails_where_momentum_is_not_the_impulse(straight):
+    """A push of 5e-7 that the path does not show passes every row; the sum of all of them does not."""
+    push = 5e-7 * np.abs(straight.path.control).max()
+    report = verify(with_path(straight, control=straight.path.control + push))
+    assert report["residual"].ok
+    assert failing(report) == ["rollout", "ledger"]
+
+
 def test_ledger_fails_where_mass_is_not_what_was_burnt():
     solution = solve(BURNING, order=4)
     assert solution.final_mass < 1.6
