@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from dmoc.boundary import Boundary
-from dmoc.effects.base import Conservative
-from dmoc.effects.frames import RotatingFrame
-from dmoc.effects.gravity import PointGravity
+from dmoc.coasting import attractors_of, center_of, coast, end_estimates, lone_attractor, spiral_between
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
-from dmoc.mesh import Guess, node_fractions
+from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes
 from dmoc.problem import TransferProblem
+from dmoc.simulation import legendre_momenta
 
 
 def starting_guess(
@@ -36,8 +35,9 @@ def starting_guess(
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = guess_duration(problem)
+    spiral = False
     if given is None:
-        position, ends = _default_path(problem, duration, fractions)
+        position, ends, spiral = _default_path(problem, duration, fractions)
     else:
         position = _given_path(problem, given, duration, fractions)
         ends = _end_states(problem, duration)[1::2]
@@ -49,14 +49,39 @@ def starting_guess(
         position[place, known] = end.fixed()[0][known]
     controls = (len(mesh) - 1 if hold else len(fractions), problem.actuator.size(problem.dimension))
     mass = np.full(len(fractions), problem.mass)
-    return Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+    guess = Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+    return replace(guess, control=_force_along(problem, guess)) if spiral else guess
+
+
+def _force_along(problem: TransferProblem, guess: Guess) -> np.ndarray:
+    """The controls that take the body along a guess, by the discrete equations; within the limits.
+
+    A path that meets its equations also has multipliers near the right ones, by least squares.
+    """
+    n, rule = problem.dimension, scheme(guess.order)
+    more = problem.actuator.labels(n)[n:]
+    if guess.control.shape[1] < n or more not in ((), ("throttle",)):
+        return guess.control
+    dynamics, begin = Dynamics(n, problem.effects, problem.actuator), problem.start_time
+    at, rows = step_nodes(len(guess.mesh) - 1, rule), np.zeros_like(guess.position)
+    np.add.at(rows, at, legendre_momenta(dynamics, guess, begin))
+    ends = ((0, begin, guess.start_velocity, 1), (-1, begin + guess.duration, guess.goal_velocity, -1))
+    for place, t, v, sign in ends:
+        rows[place] += sign * dynamics.point(t, guess.position[place], v, problem.mass)[1].full().ravel()
+    force = -problem.mass * rows / (guess.duration * node_weights(guess.mesh, rule))[:, None]
+    if guess.hold:
+        force = np.einsum("j,jkn->kn", rule.weights, force[at])
+    thrust, limit = np.linalg.norm(force, axis=1, keepdims=True), problem.actuator.force_limit()
+    control = np.hstack([force, thrust]) if more else force
+    return control if limit is None else control * min(1.0, limit / (thrust.max() or limit))
 
 
 def guess_duration(problem: TransferProblem) -> float:
     """The duration, or a likely one within its bounds [s].
 
     With a force limit: from rest to rest over the distance and the change of velocity at full
-    force, and a fifth more; otherwise the geometric mean of the bounds.
+    force, and a fifth more; where the angle on an orbit is open, over the distance from the attractor
+    or the change of the orbit, whatever is longer. Otherwise the geometric mean of the bounds.
     """
     shortest, longest = problem.duration_bounds
     if not problem.free_duration:
@@ -67,7 +92,11 @@ def guess_duration(problem: TransferProblem) -> float:
         return middle
     q0, v0, q1, v1 = _end_states(problem, middle)
     acceleration = limit / problem.mass
-    needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
+    spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
+    if spiral is not None:
+        needed = max(2 * np.sqrt(spiral.climb / acceleration), spiral.velocity_change / acceleration)
+    else:
+        needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
     return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
 
 
@@ -92,116 +121,40 @@ def _given_path(problem: TransferProblem, given: Any, duration: float, fractions
 
 def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
     """Start position and velocity, goal position and velocity, with likely values for what is free."""
-    (q0, v0), (q1, v1) = _estimates(problem, duration)
+    (q0, v0), (q1, v1) = end_estimates(problem, duration)
     q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1), q0)
     q1 = np.where(np.isnan(q1), q0, q1)
     mean = (q1 - q0) / duration
     return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
 
 
-def _estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Position and velocity of start and goal; near an attractor an open end is where the other one coasts."""
-    ends, times = (problem.start, problem.goal), (0.0, duration)
-    states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
-    whole = [not np.isnan(state).any() for state in states]
-    settled = [end.anchored and known for end, known in zip(ends, whole, strict=True)]
-    attractors = [effect for effect in problem.effects if isinstance(effect, PointGravity)]
-    if attractors and any(whole) and not all(settled):
-        known = (settled if any(settled) else whole).index(True)
-        open_end = 1 - known
-        states[open_end] = _carried(problem, states[known], times[known], ends[open_end], times[open_end])
-    return states
-
-
-def _carried(problem: TransferProblem, state: tuple, begin: float, end: Boundary, finish: float) -> tuple:
-    """A state at an open end, reached by coasting there from the known end.
-
-    Onto an orbit: half the time on the one, half on the other, which is the mean of the angles that
-    the two sweep.
-    """
-    middle = 0.5 * (begin + finish)
-    state = _drift(problem, begin, middle, state)
-    likely = end.estimate(problem.start_time + middle, state)
-    if not (end.anchored or np.isnan(likely).any()):
-        state = likely
-    state = _drift(problem, middle, finish, state)
-    position, velocity = end.estimate(problem.start_time + finish, state)
-    if end.anchored:
-        state = (position, _turned(problem, state, position))
-    return tuple(np.where(np.isnan(at), here, at) for at, here in zip((position, velocity), state, strict=True))
-
-
-def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
-    """A state some time later, or earlier, without thrust."""
-    return tuple(np.split(_coast(problem, begin, finish, *state).y[:, -1], 2))
-
-
-def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:
-    """The velocity of a state as it would be at another place around the first attractor."""
-    q, v = state
-    attractor = next(effect for effect in problem.effects if isinstance(effect, PointGravity))
-    center = _center(attractor, len(q))
-    q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
-    up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
-    turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
-    return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]
-
-
-def _unit(x: np.ndarray) -> np.ndarray:
-    return x / (np.linalg.norm(x) or 1.0)
-
-
 def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
+    """Positions, the velocities of both ends, and whether they are those of a spiral."""
     q0, v0, q1, v1 = _end_states(problem, duration)
-    attractors = [effect for effect in problem.effects if isinstance(effect, PointGravity)]
+    attractors, straight = attractors_of(problem), q0 + fractions[:, None] * (q1 - q0)
     if not attractors:
-        return q0 + fractions[:, None] * (q1 - q0), (v0, v1)
-    forward = _coast(problem, 0.0, duration, q0, v0)
-    backward = _coast(problem, duration, 0.0, q1, v1)
+        return straight, (v0, v1), False
+    spiral = spiral_between(problem, duration, ((q0, v0), (q1, v1)))
+    if spiral is not None:
+        path = spiral.states(fractions)[0] + spiral.center
+        return path[:, : problem.dimension], (v0, v1), True
+    forward = coast(problem, 0.0, duration, q0, v0)
+    backward = coast(problem, duration, 0.0, q1, v1)
     if forward.status != 0 or backward.status != 0:
         # a coast that falls into an attractor is no path to start from
-        return _keep_clear(q0 + fractions[:, None] * (q1 - q0), attractors, q0, q1), (v0, v1)
+        return _keep_clear(straight, attractors, q0, q1), (v0, v1), False
     sample = np.linspace(0.0, 1.0, max(2000, 8 * forward.t.size, 8 * backward.t.size))
     arcs = [arc.sol(sample * duration)[: problem.dimension].T for arc in (forward, backward)]
-    turning = any(isinstance(effect, RotatingFrame) for effect in problem.effects)
-    if len(attractors) == 1 and not turning and problem.dimension > 1:
-        center = _center(attractors[0], problem.dimension)
+    lone = lone_attractor(problem)
+    if lone is not None:
+        center = center_of(lone, problem.dimension)
         states = ((q0 - center, v0), (q1 - center, v1))
         path = center + _blend_around(sample, arcs[0] - center, arcs[1] - center, states)
     else:
         blend = _smooth(sample)[:, None]
         path = (1 - blend) * arcs[0] + blend * arcs[1]
     path = np.stack([np.interp(fractions, sample, column) for column in path.T], axis=1)
-    return _keep_clear(path, attractors, q0, q1), (v0, v1)
-
-
-def _coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: np.ndarray) -> Any:
-    from scipy.integrate import solve_ivp
-
-    # without what resists: backward in time drag feeds the motion without bound
-    conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
-    dynamics = Dynamics(problem.dimension, conservative, problem.actuator)
-    n, still = problem.dimension, np.zeros(problem.dimension)
-    centers = [_center(effect, n) for effect in conservative if isinstance(effect, PointGravity)]
-
-    def rate(t: float, state: np.ndarray) -> np.ndarray:
-        push = dynamics.acceleration(problem.start_time + t, state[:n], state[n:], problem.mass, still)
-        return np.concatenate([state[n:], np.array(push).ravel()])
-
-    def fell_in(t: float, state: np.ndarray) -> float:
-        return min((_distance(state[:n], at) - 0.02 * _distance(q, at) for at in centers), default=1.0)
-
-    fell_in.terminal = True  # type: ignore[attr-defined]
-    settings = {"rtol": 1e-6, "atol": 1e-9, "dense_output": True, "events": fell_in}
-    return solve_ivp(rate, (start, end), np.concatenate([q, v]), **settings)
-
-
-def _center(attractor: PointGravity, dimension: int) -> np.ndarray:
-    return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
-
-
-def _distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.linalg.norm(a - b))
+    return _keep_clear(path, attractors, q0, q1), (v0, v1), False
 
 
 def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
@@ -246,7 +199,7 @@ def _orbit_frame(states) -> np.ndarray:
 def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
     """Push nodes out of the neighbourhood of attractors, where no scheme can start."""
     for attractor in attractors:
-        center = _center(attractor, len(q0))
+        center = center_of(attractor, len(q0))
         offset = path - center
         distance = np.linalg.norm(offset, axis=1, keepdims=True)
         least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))

@@ -77,9 +77,9 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
+        self._complete_ends()
         if self.objective.metered:
             object.__setattr__(self, "actuator", self.actuator.metered(self.dimension))
-        self._complete_ends()
         if self.start.dimension != self.goal.dimension:
             raise ValueError(
                 f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"

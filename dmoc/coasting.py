@@ -1,0 +1,146 @@
+"""Where a body gets without thrust, and from that the states of ends that leave them open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.boundary import Boundary
+from dmoc.effects.base import Conservative
+from dmoc.effects.frames import RotatingFrame
+from dmoc.effects.gravity import PointGravity
+from dmoc.mechanics import Dynamics
+from dmoc.problem import TransferProblem
+from dmoc.spiral import Spiral
+
+# How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
+PASSES = 3
+
+
+def attractors_of(problem: TransferProblem) -> list[PointGravity]:
+    return [effect for effect in problem.effects if isinstance(effect, PointGravity)]
+
+
+def lone_attractor(problem: TransferProblem) -> PointGravity | None:
+    """The one attractor of a frame that does not turn, around which there are orbits."""
+    attractors = attractors_of(problem)
+    turning = any(isinstance(effect, RotatingFrame) for effect in problem.effects)
+    return attractors[0] if len(attractors) == 1 and not turning and problem.dimension > 1 else None
+
+
+def center_of(attractor: PointGravity, dimension: int) -> np.ndarray:
+    return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
+
+
+def coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: np.ndarray) -> Any:
+    """Motion without thrust between two times since the start [s]; its status is 1 if it falls in."""
+    from scipy.integrate import solve_ivp
+
+    # without what resists: backward in time drag feeds the motion without bound
+    conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
+    dynamics = Dynamics(problem.dimension, conservative, problem.actuator)
+    n, still = problem.dimension, np.zeros(problem.dimension)
+    centers = [center_of(attractor, n) for attractor in attractors_of(problem)]
+
+    def rate(t: float, state: np.ndarray) -> np.ndarray:
+        push = dynamics.acceleration(problem.start_time + t, state[:n], state[n:], problem.mass, still)
+        return np.concatenate([state[n:], np.array(push).ravel()])
+
+    def fell_in(t: float, state: np.ndarray) -> float:
+        return min((_distance(state[:n], at) - 0.02 * _distance(q, at) for at in centers), default=1.0)
+
+    fell_in.terminal = True  # type: ignore[attr-defined]
+    settings = {"rtol": 1e-6, "atol": 1e-9, "dense_output": True, "events": fell_in}
+    return solve_ivp(rate, (start, end), np.concatenate([q, v]), **settings)
+
+
+def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position and velocity of start and goal, NaN where nothing is known.
+
+    Near an attractor an end that leaves something open is where the other end coasts.
+    """
+    ends, times = (problem.start, problem.goal), (0.0, duration)
+    states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
+    whole = [not np.isnan(state).any() for state in states]
+    settled = [end.anchored and known for end, known in zip(ends, whole, strict=True)]
+    if attractors_of(problem) and any(whole) and not all(settled):
+        known = (settled if any(settled) else whole).index(True)
+        open_end = 1 - known
+        states[open_end] = _carried(problem, states[known], times[known], ends[open_end], times[open_end])
+    return states
+
+
+def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Spiral | None:
+    """The spiral from start to goal, if one of them leaves its place open and the spiral ends there."""
+    ends = (problem.start, problem.goal)
+    from_goal = ends[1].anchored and not ends[0].anchored
+    spiral = _spiral(problem, duration, states, from_goal)
+    if spiral is None or all(end.anchored for end in ends):
+        return None
+    place = states[0 if from_goal else 1][0]
+    gap = _distance(_end_of(spiral, problem.dimension)[0], place)
+    return spiral if gap < 0.05 * _distance(place, spiral.center[: problem.dimension]) else None
+
+
+def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: bool) -> Spiral | None:
+    attractor, n = lone_attractor(problem), problem.dimension
+    if attractor is None:
+        return None
+    center, fill = center_of(attractor, n), np.zeros(3 - n)
+    start, goal = ((np.append(q - center, fill), np.append(v, fill)) for q, v in states)
+    spiral = Spiral(attractor.mu, np.append(center, fill), duration, start, goal, from_goal)
+    return spiral if spiral.eccentricity < 0.9 else None
+
+
+def _end_of(spiral: Spiral, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity at the end that the motion decides."""
+    q, v = spiral.states(np.array([0.0 if spiral.from_goal else 1.0]))
+    return (q[0] + spiral.center)[:dimension], v[0, :dimension]
+
+
+def _carried(problem: TransferProblem, known: tuple, begin: float, end: Boundary, finish: float) -> tuple:
+    """A state at an open end, reached by coasting there from the known end.
+
+    Onto an orbit: half the time on the one and half on the other, then as a spiral leads there.
+    """
+    middle = 0.5 * (begin + finish)
+    state = _drift(problem, begin, middle, known)
+    likely = end.estimate(problem.start_time + middle, state)
+    orbit = not (end.anchored or np.isnan(likely).any())
+    state = _drift(problem, middle, finish, likely if orbit else state)
+    position, velocity = end.estimate(problem.start_time + finish, state)
+    if end.anchored:
+        state = (position, _turned(problem, state, position))
+    state = tuple(
+        np.where(np.isnan(at), here, at) for at, here in zip((position, velocity), state, strict=True)
+    )
+    for _ in range(PASSES if orbit else 0):
+        backward = begin > finish
+        spiral = _spiral(problem, abs(finish - begin), (state, known) if backward else (known, state), backward)
+        if spiral is not None:
+            state = end.estimate(problem.start_time + finish, _end_of(spiral, problem.dimension))
+    return state
+
+
+def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
+    """A state some time later, or earlier, without thrust."""
+    return tuple(np.split(coast(problem, begin, finish, *state).y[:, -1], 2))
+
+
+def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:
+    """The velocity of a state as it would be at another place around the first attractor."""
+    q, v = state
+    center = center_of(attractors_of(problem)[0], len(q))
+    q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
+    up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
+    turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
+    return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]
+
+
+def _unit(x: np.ndarray) -> np.ndarray:
+    return x / (np.linalg.norm(x) or 1.0)
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b))
