@@ -58,7 +58,7 @@ TERMS = {
     "goal_velocity": Term("m/s", "velocity at the goal"),
     "forces": Term("N", "controls of the actuator, one column a node, or a step where they are held"),
     "masses": Term("kg", "masses at the nodes, one column a node"),
-    "residual": Term("N", "defect of the discrete Euler-Lagrange equations, one column a node"),
+    "residual": Term("N", "force minus what the discrete motion needs, one column a node"),
 }
 
 

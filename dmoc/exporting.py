@@ -46,8 +46,9 @@ def export(
     CasADi alone loads, in Python, C++, MATLAB or Octave; step, rollout and residual become C code too.
     `manifest.json` has shape, unit and meaning of every argument and the checksum of every file.
 
-    An `nlpsol` has no status output. The solver's outputs `largest_residual` [N] and `violation` [-] say what
-    a plan is worth, and `solver.stats()["return_status"]` what Ipopt says, also after loading.
+    An `nlpsol` has no status output. The solver's outputs `largest_residual` [N] and `violation` [-] say
+    whether a plan can be flown; whether it is an optimum, `solver.stats()["return_status"]` says, also after
+    loading.
 
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.
@@ -223,9 +224,11 @@ Python, with CasADi alone:
     plan = solver(**inputs)
     print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
 
-To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too. A
-plan is good if `largest_residual` [N] and `violation` [-] are small: the solver always returns, whatever its
-status. Other numbers of the problem than the inputs of the solver are fixed in it.
+The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
+(of rows and bounds, scaled) are small; that it is an optimum only the status says.
+
+To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too,
+moved on to the new times. What is no input of the solver is fixed in it.
 
 C++: `casadi::Function::load("solver.casadi")`, called with a `DMDict`. MATLAB and Octave:
 `solver = casadi.Function.load('solver.casadi'); plan = solver.call(nominal.call(struct()))`.
