@@ -33,7 +33,7 @@ class TransferProblem:
     actuator : Actuator
         What pushes it.
     objective : Objective
-        What is minimised.
+        What is minimised, or maximised as `FinalMass` is.
     constraints : sequence of Constraint
         What is forbidden on the way.
     guess : callable, tuple of arrays or Solution, optional
