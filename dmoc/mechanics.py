@@ -154,9 +154,14 @@ def step_momenta(scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequenc
     """
     v = step_velocities(scheme, h, q)
     at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
-    momenta = [dldv for _, dldv, _ in at]
+    # dl/dv is v and what effects add: the first part is one constant matrix, the second often nothing
+    added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
+    inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
+    moves = [position - q[0] for position in q[1:]]
     return [
-        weighted(scheme.weights * scheme.derivative[:, j], momenta) + h * w * (dldq + force + push[j])
+        weighted(inertia[j, 1:], moves) / h
+        + weighted(scheme.weights * scheme.derivative[:, j], added)
+        + h * w * (dldq + force + push[j])
         for j, (w, (dldq, _, force)) in enumerate(zip(scheme.weights, at, strict=True))
     ]
 

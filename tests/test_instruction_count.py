@@ -37,12 +37,12 @@ MOVING = [LinearDrag(0.3), RotatingFrame(0.2), ClohessyWiltshire(0.1)]
 BARE = {
     "nodal": {
         "node": {"rows": 12, "cost": 12, "gradient": 16, "jacobian": 8, "hessian": 7},
-        "step": {"rows": 24, "cost": 2, "gradient": 5, "jacobian": 26, "hessian": 0},
+        "step": {"rows": 19, "cost": 2, "gradient": 5, "jacobian": 19, "hessian": 0},
         "ends": {"rows": 10, "cost": 2, "gradient": 9, "jacobian": 6, "hessian": 0},
     },
     "held": {
         "node": {"rows": 3, "cost": 2, "gradient": 3, "jacobian": 0, "hessian": 0},
-        "step": {"rows": 42, "cost": 17, "gradient": 25, "jacobian": 38, "hessian": 7},
+        "step": {"rows": 35, "cost": 17, "gradient": 25, "jacobian": 31, "hessian": 7},
         "ends": {"rows": 10, "cost": 2, "gradient": 9, "jacobian": 6, "hessian": 0},
     },
 }
