@@ -109,7 +109,7 @@ def _documentation(exported: Exported) -> str:
 
 
 def _example(planner: Planner, rollout: ca.Function, residual: ca.Function) -> str:
-    scene, guess = planner.scene, planner.first_guess
+    scene, guess = planner.scene, planner.guess
     problem, force = scene.problem, 0.1 * planner.nlp.units.force
     known = {"mass": problem.mass, "start_time": problem.start_time, "duration": guess.duration}
     known |= {name: planner.numbers.value(name) for name in scene.flow.name_in()[1:]}

@@ -14,8 +14,11 @@ from dmoc.export_numbers import Numbers
 from dmoc.export_residual import path_symbols, residual_of, velocities_of
 from dmoc.guess import starting_guess
 from dmoc.ipopt import Answer, make_solver, path_of
+from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
-from dmoc.transcription import NLP
+from dmoc.problem import TransferProblem
+from dmoc.stability import refuse_unstable
+from dmoc.transcription import NLP, check_mesh, transcribe_onto, units_of
 
 
 @dataclass(frozen=True)
@@ -24,22 +27,31 @@ class Planner:
 
     scene: Scene
     nlp: NLP
+    guess: Guess
+
+    @classmethod
+    def of(cls, problem: TransferProblem, order: int, steps: int, hold: bool, guess: Any = None) -> Planner:
+        """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
+        start = starting_guess(problem, check_mesh(steps), order, hold, guess)
+        scene = Scene(problem, scheme(order), steps, hold)
+        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds[0])
+        return cls(scene, transcribe_onto(problem, start, units_of(problem, start)), start)
 
     @cached_property
     def numbers(self) -> Numbers:
         return Numbers(self.nlp)
 
     @cached_property
-    def first_guess(self) -> Guess:
-        return starting_guess(self.scene.problem, self.nlp.mesh, self.nlp.scheme.order, self.scene.hold)
-
-    @cached_property
     def multipliers(self) -> dict[str, np.ndarray]:
         """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
         columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
         answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0.0)
-        found = path_of(self.nlp, self.scene.problem, answer).multipliers
-        return {_multiplier_name(key, list(found)): value.T for key, value in found.items() if value.size}
+        return self.by_name(path_of(self.nlp, self.scene.problem, answer).multipliers)
+
+    def by_name(self, multipliers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Multipliers of a path under the names they have here, one column an index."""
+        names = {key: _multiplier_name(key, list(multipliers)) for key in multipliers}
+        return {names[key]: value.T for key, value in multipliers.items() if value.size}
 
     @property
     def plan_names(self) -> list[str]:
@@ -140,14 +152,14 @@ def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX
 
 def nominal(planner: Planner) -> Exported:
     """What the problem itself states, and its own guess: inputs of the solver to begin with."""
-    guess = planner.first_guess
+    guess, known = planner.guess, planner.by_name(planner.guess.multipliers)
     ends = np.linspace(guess.start_velocity, guess.goal_velocity, planner.scene.steps + 1)
     plan: dict[str, Any] = {"positions": guess.position.T, "velocities": ends.T, "forces": guess.control.T}
     plan |= {"masses": guess.mass[None], "duration": guess.duration}
     values = {name: planner.numbers.value(name) for name in planner.numbers.names}
     values |= {f"guess_{name}": ca.DM(plan[name]) for name in planner.plan_names}
-    values |= {f"guess_{name}": ca.DM.zeros(*one.shape) for name, one in planner.multipliers.items()}
-    outputs = {name: ca.MX(value) for name, value in values.items()}
+    values |= {f"guess_{name}": known.get(name, 0 * one) for name, one in planner.multipliers.items()}
+    outputs = {name: ca.MX(ca.DM(value)) for name, value in values.items()}
     words = "the problem's own numbers and its guess, named like the inputs of the solver"
     return Exported(named("nominal", {}, outputs), words, _solver_terms(planner))
 

@@ -18,12 +18,11 @@ import numpy as np
 
 from dmoc import __version__, export_functions, export_residual, export_solver
 from dmoc.export_code import write_code
-from dmoc.export_functions import Exported, Scene
+from dmoc.export_functions import Exported
 from dmoc.export_solver import Planner
 from dmoc.lobatto import scheme
 from dmoc.problem import TransferProblem
 from dmoc.solver import DEFAULT_STEPS
-from dmoc.transcription import transcribe
 
 FORMAT = "dmoc export"
 FORMAT_VERSION = 1
@@ -36,6 +35,7 @@ def export(
     steps: int | None = None,
     hold: bool = False,
     c: bool = True,
+    guess: Any = None,
     options: dict[str, Any] | None = None,
 ) -> list[Path]:
     """Write the functions of a problem to a folder: all arguments named and in SI units.
@@ -67,6 +67,9 @@ def export(
         Forces constant over each step.
     c : bool
         Whether to write C code.
+    guess : optional
+        Where the solver starts from, as in `solve`. A Solution is best: `nominal` then holds a plan that
+        `warm_solver` can go on from at once. The exported solver has one mesh, no ladder of coarser ones.
     options : dict, optional
         CasADi `nlpsol` options of both solvers, for example {"ipopt.max_wall_time": 0.5}.
 
@@ -78,12 +81,11 @@ def export(
     Raises
     ------
     ValueError
-        If a number has no meaning, or the folder holds anything else.
+        If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
     """
-    rule = scheme(order)
-    steps = DEFAULT_STEPS[order] if steps is None else steps
+    steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
     target = _checked_folder(Path(folder))
-    planner = Planner(Scene(problem, rule, steps, hold), transcribe(problem, steps, order, hold))
+    planner = Planner.of(problem, order, steps, hold, guess)
     functions = functions_of(planner, options)
     with _whole_folder(target) as work:
         for exported in functions:
@@ -198,13 +200,13 @@ def _whole_folder(target: Path) -> Iterator[Path]:
             os.replace(target, old)
         try:
             os.replace(work, target)
-        except OSError:
+        except BaseException:
             if old.exists():
                 os.replace(old, target)
             raise
+        shutil.rmtree(old, ignore_errors=True)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 README = """\

@@ -29,12 +29,10 @@ from dmoc import (
 )
 from dmoc.cli import main
 from dmoc.export_code import write_code
-from dmoc.export_functions import Scene, rollout, step
+from dmoc.export_functions import rollout, step
 from dmoc.export_residual import residual
 from dmoc.export_solver import Planner
 from dmoc.exporting import functions_of
-from dmoc.lobatto import scheme
-from dmoc.transcription import transcribe
 
 FLYER = TransferProblem(
     10.0,
@@ -82,7 +80,7 @@ assert "dmoc" not in sys.modules
 
 
 def planner_of(problem, order, steps, hold):
-    return Planner(Scene(problem, scheme(order), steps, hold), transcribe(problem, steps, order, hold))
+    return Planner.of(problem, order, steps, hold)
 
 
 def functions(problem, order, steps, hold):

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from dmoc import LinearDrag, RotatingFrame, State, TransferProblem, UniformGravity, simulate, solve, verify
-from dmoc.export_functions import Scene
 from dmoc.export_solver import Planner
 from dmoc.exporting import functions_of
-from dmoc.lobatto import scheme
-from dmoc.transcription import transcribe
 
 TURNING = TransferProblem(
     2.0,
@@ -25,7 +22,7 @@ TIMES = {"mass": 2.0, "start_time": 0.5, "duration": 5.0}
 
 
 def functions(problem, order, steps, hold):
-    planner = Planner(Scene(problem, scheme(order), steps, hold), transcribe(problem, steps, order, hold))
+    planner = Planner.of(problem, order, steps, hold)
     return {e.function.name(): e.function for e in functions_of(planner)}
 
 

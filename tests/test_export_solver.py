@@ -1,6 +1,10 @@
 """The exported solver answers for other numbers, from a former plan, and says what its answer is worth."""
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -19,15 +23,13 @@ from dmoc import (
     PointGravity,
     RotatingFrame,
     SpeedLimit,
+    Spring,
     State,
     Time,
     TransferProblem,
     solve,
 )
-from dmoc.export_functions import Scene
 from dmoc.export_solver import Planner, nominal, solver
-from dmoc.lobatto import scheme
-from dmoc.transcription import transcribe
 
 STEPS = 20
 REST = State((0, 0), (0, 0))
@@ -111,7 +113,7 @@ OTHERS = {
 
 def made(problem, hold=True, order=2, options=None):
     """The problem's own inputs, the cold and the warm solver."""
-    planner = Planner(Scene(problem, scheme(order), STEPS, hold), transcribe(problem, STEPS, order, hold))
+    planner = Planner.of(problem, order, STEPS, hold)
     solvers = [solver(planner, options, warm).function for warm in (False, True)]
     return nominal(planner).function(), *solvers
 
@@ -191,3 +193,27 @@ def test_two_boxes_on_one_axis_are_no_inputs():
     inputs, _, _ = made(TransferProblem(2, REST, State((1, 1), (0, 0)), 5, constraints=boxes))
     assert not any("keep_in" in name for name in inputs)
     assert {"start_position", "mass", "duration"} <= inputs.keys()
+
+
+def test_from_a_solution_the_warm_solver_goes_on_at_once():
+    solution = solve(FLYER, steps=STEPS, hold=True)
+    planner = Planner.of(FLYER, 2, STEPS, True, guess=solution)
+    warm = solver(planner, None, warm=True).function
+    plan = warm(**nominal(planner).function())
+    assert warm.stats()["iter_count"] <= 3
+    assert float(plan["objective"]) == pytest.approx(solution.objective, rel=1e-8)
+
+
+def test_a_mesh_beyond_the_stability_limit_is_refused():
+    spring = TransferProblem(1, REST, State((1, 0), (0, 0)), 100, effects=[Spring(4.0, (0, 0))])
+    with pytest.raises(ValueError, match="steps"):
+        Planner.of(spring, 2, STEPS, True)
+
+
+@pytest.mark.slow
+def test_the_closed_loop_keeps_clear_and_arrives():
+    script = Path(__file__).parent.parent / "scripts" / "closed_loop.py"
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert "39 plans, 0 of them refused" in done.stdout
+    clearance, miss = re.search(r"again: +clearance ([\d.]+) mm, miss ([\d.]+) mm", done.stdout).groups()
+    assert float(clearance) > 20 and float(miss) < 20

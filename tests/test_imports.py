@@ -85,7 +85,7 @@ MAY_IMPORT = {
     "export_functions": "BASICS mechanics problem",
     "export_residual": "export_functions simulation",
     "export_numbers": "BASICS problem transcription export_functions",
-    "export_solver": "BASICS NLP export_functions export_residual export_numbers",
+    "export_solver": "BASICS NLP stability export_functions export_residual export_numbers",
     "export_code": "export_functions export_solver",
     "exporting": "__init__ BASICS NLP solver export_functions export_residual export_solver export_code",
     "plot_style": "BASICS mesh solution",
