@@ -43,6 +43,7 @@ _HOMES = {
     ),
     "dmoc.engines": ("Engine", "Nozzles"),
     "dmoc.exporting": ("export",),
+    "dmoc.long_run": ("drift",),
     "dmoc.objectives": (
         "Effort",
         "FinalHeight",
@@ -59,6 +60,7 @@ _HOMES = {
     "dmoc.simulation": ("Trajectory", "simulate"),
     "dmoc.solution": ("Solution", "SolveError", "load"),
     "dmoc.solver": ("solve",),
+    "dmoc.study": ("Formulation", "work_precision"),
     "dmoc.transcription": ("NLP", "transcribe"),
     "dmoc.verification": ("Report", "verify"),
 }

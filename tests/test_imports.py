@@ -79,7 +79,11 @@ MAY_IMPORT = {
     "verification": "BASICS NLP MOTION solution case limits optimality",
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
-    "study": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT",
+    "formulation": "mesh problem",
+    "study": "BASICS NLP MOTION ANSWER formulation long_run",
+    "long_run": "BASICS EFFECTS PARTS mechanics problem",
+    "plot_study": "files study plot_style",
+    "report_study": "report study",
     "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     # what leaves the package
     "export_functions": "BASICS mechanics problem",
@@ -92,7 +96,9 @@ MAY_IMPORT = {
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study sweep exporting",
+    "cli_parts": "library plot solution __init__",
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study plot_study "
+    "report_study sweep exporting cli_parts",
 }
 
 # one of each pair imports the other inside a function, when it is asked for

@@ -1,0 +1,75 @@
+"""A transfer as another method writes it down in CasADi, and what its answer means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.mesh import Guess, uniform_mesh
+from dmoc.problem import TransferProblem
+
+
+@dataclass(frozen=True)
+class Formulation:
+    """A transfer as some other method writes it in CasADi: an NLP, and what its unknowns mean.
+
+    Attributes
+    ----------
+    x, f, g : MX
+        Unknowns, objective and rows, best scaled to be near 1.
+    guess : array
+        Where to start.
+    bounds, row_bounds : (array, array)
+        Lower and upper bounds of the unknowns and of the rows.
+    objective_unit : float
+        The objective in its own unit is this times f.
+    ends : MX, shape (2 axes, 2)
+        Position [m] and velocity [m/s] at the start and at the goal.
+    controls : MX, shape (axes, count)
+        Forces [N] at `points` of every step, step after step; where the points include both ends of a
+        step, neighbours share theirs.
+    points : tuple of float
+        Fractions of a step between 0 and 1, through which the force is a polynomial.
+    """
+
+    x: ca.MX
+    f: ca.MX
+    g: ca.MX
+    guess: np.ndarray
+    bounds: tuple[np.ndarray, np.ndarray]
+    row_bounds: tuple[np.ndarray, np.ndarray]
+    objective_unit: float
+    ends: ca.MX
+    controls: ca.MX
+    points: tuple[float, ...]
+
+
+def as_nlp(problem: TransferProblem, made: Formulation, steps: int) -> Any:
+    """A formulation in the form that `make_solver` takes; without derivatives CasADi makes its own."""
+    derivatives = dict.fromkeys(("jacobian", "hessian", "gradient"))
+    return SimpleNamespace(
+        problem=problem,
+        mesh=uniform_mesh(steps),
+        scheme=SimpleNamespace(degree=max(len(made.points) - 1, 1)),
+        row_bounds=made.row_bounds,
+        assembly=SimpleNamespace(x=made.x, p=ca.MX.sym("p", 0), f=made.f, g=made.g, **derivatives),
+    )
+
+
+def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[Guess, int]:
+    """The ends and controls a method found, in the form that the independent integrator takes."""
+    ends, forces = (part.full() for part in ca.Function("read", [made.x], [made.ends, made.controls])(x))
+    n, points = problem.dimension, np.array(made.points)
+    shared = int(points[0] == 0 and points[-1] == 1)
+    at = np.arange(len(points))[:, None] + (len(points) - shared) * np.arange(steps)
+    # a held control may have any number of components: here the coefficients of its polynomial
+    powers = np.linalg.inv(np.vander(points, increasing=True))
+    control = np.einsum("pj,njk->kpn", powers, forces[:, at]).reshape(steps, -1)
+    position = np.linspace(ends[:n, 0], ends[:n, 1], steps + 1)
+    mass = np.full(steps + 1, problem.mass)
+    duration, velocities = problem.duration_bounds[0], (ends[n:, 0], ends[n:, 1])
+    return Guess(uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities), forces.shape[1]

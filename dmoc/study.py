@@ -1,0 +1,290 @@
+"""What accuracy costs in time: solves on many meshes, by orders and by other methods."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from dmoc.climb import Climb
+from dmoc.formulation import Formulation as Formulation
+from dmoc.formulation import as_nlp, path_of
+from dmoc.guess import starting_guess
+from dmoc.ipopt import STATUS, make_solver
+from dmoc.lobatto import scheme
+from dmoc.long_run import drift as drift
+from dmoc.mechanics import Dynamics
+from dmoc.mesh import Guess, uniform_mesh
+from dmoc.problem import TransferProblem
+from dmoc.reference import reference as fly
+from dmoc.refine import path_scales
+from dmoc.solution import Solution
+from dmoc.solver import solve
+from dmoc.transcription import check_mesh
+
+STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 48, 96), 8: (8, 16, 32, 64)}
+OTHER_STEPS = (25, 50, 100, 200, 400)
+REFERENCE_STEPS = 100
+TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
+
+
+Method = Callable[[TransferProblem, int], Formulation]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One method on one mesh: how far off it was and what it took.
+
+    Attributes
+    ----------
+    method : str
+        "order 2" to "order 8" are dmoc's own, with ", cold" if without coarse meshes on the way.
+    order : int or None
+        None for other methods.
+    steps, nodes : int
+        Steps of the mesh and places on it where there is a control.
+    objective : float
+        [unit of the objective].
+    error : float
+        Relative error of the objective [-], no less than what the reference is known to.
+    path_error : float
+        How far an independent integrator, driven by the controls found, misses the goal that the
+        method believes to reach: of the path's extent or of its speed, whichever is more [-].
+    iterations, calls : int
+        Iterations of Ipopt and evaluations of functions and derivatives it asked for, on all meshes.
+    build_s, solve_s : float
+        Medians of the seconds spent in Ipopt, and before and after it.
+    coarse_to_fine : bool
+        Whether coarser meshes came first.
+    status : str
+        "solved", or why not.
+    """
+
+    method: str
+    order: int | None
+    steps: int
+    nodes: int
+    objective: float
+    error: float
+    path_error: float
+    iterations: int
+    calls: int
+    build_s: float
+    solve_s: float
+    coarse_to_fine: bool
+    status: str
+
+    @property
+    def seconds(self) -> float:
+        """Seconds from the problem to the answer."""
+        return self.build_s + self.solve_s
+
+
+def work_precision(
+    problem: TransferProblem,
+    orders: Sequence[int] = (2, 4, 6, 8),
+    steps: Sequence[int] | None = None,
+    repeats: int = 3,
+    against: Mapping[str, Method] | Sequence[tuple[str, Method]] = (),
+    reference: float | None = None,
+    cold: bool = False,
+) -> list[Trial]:
+    """Solve a problem at several orders on several meshes, and measure error and time.
+
+    Every solve is repeated, with the repetitions of all solves taking turns, so that whatever else
+    the computer does falls on all of them alike.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+    orders : sequence of int
+        Of 2, 4, 6, 8.
+    steps : sequence of int, optional
+        Meshes; by default 100 to 1600 steps at order 2, and down to 8 to 64 at order 8.
+    repeats : int
+        How often each solve is timed; the median counts.
+    against : mapping or pairs
+        Other methods by name: functions of (problem, steps) that give a `Formulation`. They get the
+        options and tolerances of dmoc's own solves.
+    reference : float, optional
+        The true objective; by default that of order 8 on a fine mesh.
+    cold : bool
+        Also solve each mesh at each order from the starting guess alone.
+
+    Returns
+    -------
+    list of Trial
+
+    Raises
+    ------
+    ValueError
+        If an argument has no meaning, or the problem cannot be solved for a reference.
+    """
+    if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
+        raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
+    meshes = {order: steps or STEPS[scheme(order).order] for order in orders}
+    for count in steps or ():
+        check_mesh(count)
+    runs: list[tuple[tuple, Callable[[], _Run]]] = [
+        (
+            (f"order {order}" + ("" if climbs else ", cold"), order, count, climbs),
+            partial(_own, problem, order, count, climbs),
+        )
+        for order in orders
+        for count in meshes[order]
+        for climbs in ((True, False) if cold else (True,))
+    ]
+    runs += [
+        ((name, None, count, False), partial(_other, problem, method, count))
+        for name, method in dict(against).items()
+        for count in steps or OTHER_STEPS
+    ]
+    value, doubt = best_known(problem) if reference is None else (float(reference), 1e-16)
+    rounds = [[run() for _, run in runs] for _ in range(repeats)]
+    return [
+        _trial(problem, labels, timed, value, doubt)
+        for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
+    ]
+
+
+def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[_Run], value: float, doubt: float) -> Trial:
+    name, order, steps, climbs = labels
+    last, solve_s = timed[-1], median(run.solve_s for run in timed)
+    return Trial(
+        name,
+        order,
+        steps,
+        last.nodes,
+        last.objective,
+        max(abs(last.objective - value) / (abs(value) or 1.0), doubt),
+        _miss(problem, last.path),
+        last.iterations,
+        last.calls,
+        median(run.seconds for run in timed) - solve_s,
+        solve_s,
+        climbs,
+        last.status,
+    )
+
+
+def best_known(problem: TransferProblem) -> tuple[float, float]:
+    """Objective by order 8 on a fine mesh, and how much it still changed from half as many steps, relative."""
+    half, full = (solve(problem, order=8, steps=count * REFERENCE_STEPS) for count in (1, 2))
+    if not full.success:
+        raise ValueError(f"no reference: order 8 on a fine mesh ended with {full.status!r}; give reference=...")
+    change = abs(half.objective - full.objective) / (abs(full.objective) or 1.0)
+    return full.objective, max(change, 1e-14)
+
+
+def time_to_reach(trials: Sequence[Trial], targets: Sequence[float] = TARGETS) -> dict[str, list[float | None]]:
+    """Seconds each method takes to an error, on the frontier of what was measured; None where not reached.
+
+    Between two solves the time is interpolated, logarithm over logarithm. Where already the fastest
+    solve is better than a target its time counts.
+    """
+    table: dict[str, list[float | None]] = {}
+    for name in dict.fromkeys(trial.method for trial in trials):
+        points = frontier([trial for trial in trials if trial.method == name])
+        table[name] = [_when(points, target) for target in targets]
+    return table
+
+
+def frontier(trials: Sequence[Trial]) -> list[Trial]:
+    """The solves that no faster solve equals in accuracy, fastest first."""
+    best: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: trial.seconds):
+        if trial.status == "solved" and (not best or trial.error < best[-1].error):
+            best.append(trial)
+    return best
+
+
+def _when(points: list[Trial], target: float) -> float | None:
+    if points and points[0].error <= target:
+        return points[0].seconds
+    for before, after in pairwise(points):
+        if after.error <= target:
+            share = np.log(target / before.error) / np.log(after.error / before.error)
+            return float(before.seconds * (after.seconds / before.seconds) ** share)
+    return None
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One solve, timed once. Its path has the goal that it believes to reach."""
+
+    path: Guess | None
+    nodes: int
+    objective: float
+    status: str
+    iterations: int
+    calls: int
+    seconds: float
+    solve_s: float
+
+
+def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> _Run:
+    """One of dmoc's own solves, by way of coarser meshes or not."""
+
+    def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
+        begun = time.perf_counter()
+        climb = Climb(problem, options)
+        first = starting_guess(problem, uniform_mesh(steps), order, False)
+        climb.up_to(first) if climbs else climb.solve_on(first)
+        return climb.solution(), time.perf_counter() - begun
+
+    try:
+        (found, seconds), calls = _counted(solve_with)
+    except ValueError as error:
+        # a mesh beyond the limit of stability is refused, and the next one may not be
+        return _Run(None, steps * order // 2 + 1, np.nan, f"refused: {error}", 0, 0, np.nan, np.nan)
+    facts = found.objective, found.status, found.iterations
+    return _Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
+
+
+def _other(problem: TransferProblem, method: Method, steps: int) -> _Run:
+    """A solve by another method, with the options and tolerances of dmoc's own."""
+
+    def solve_with(options: dict[str, Any]) -> tuple[Formulation, dict, dict, list[float]]:
+        times = [time.perf_counter()]
+        made = method(problem, steps)
+        solver = make_solver(as_nlp(problem, made, steps), options)
+        (lbx, ubx), (lbg, ubg) = made.bounds, made.row_bounds
+        x0 = np.clip(made.guess, lbx, ubx)
+        times.append(time.perf_counter())
+        result = solver(x0=x0, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
+        return made, result, solver.stats(), [*times, time.perf_counter()]
+
+    (made, result, stats, (begun, ready, done)), calls = _counted(solve_with)
+    path, nodes = path_of(problem, made, steps, result["x"])
+    objective, status = made.objective_unit * float(result["f"]), STATUS.get(stats["return_status"], "failed")
+    return _Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
+
+
+def _counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
+    """What a solve gives, and how many evaluations the summaries of Ipopt name, those of all meshes."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "ipopt.txt"
+        print_to = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}
+        found = solve_with({f"ipopt.{name}": value for name, value in print_to.items()})
+        text = file.read_text() if file.exists() else ""
+    return found, sum(map(int, re.findall(r"^Number of .* evaluations +=\s*(\d+)$", text, re.MULTILINE)))
+
+
+def _miss(problem: TransferProblem, path: Guess | None) -> float:
+    """By how much the independent integrator misses the goal of a path, of its extent or speed [-]."""
+    if path is None or not np.isfinite(path.control).all():
+        return np.nan
+    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    extent, speed = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
+    position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
+    gaps = np.linalg.norm(position - path.position[-1]), np.linalg.norm(velocity - path.goal_velocity)
+    return float(max(gaps[0] / extent, gaps[1] / speed))
