@@ -69,7 +69,7 @@ class ProblemFile:
         from dmoc.problem import TransferProblem
 
         for name, value in values.items():
-            _check_type(name, value, self._parameter(name).default)
+            _check_type(name, value, self.parameter(name).default)
         made = _guarded(self.path, lambda: self.function(**values))
         if not isinstance(made, TransferProblem):
             raise ValueError(
@@ -78,7 +78,8 @@ class ProblemFile:
         chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
         return replace(made, name=self.name, parameters=chosen)
 
-    def _parameter(self, name: str) -> Parameter:
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of this name; ValueError if there is none."""
         known = {parameter.name: parameter for parameter in self.parameters}
         if name in known:
             return known[name]
