@@ -118,6 +118,30 @@ def solve(
     _show(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
 
 
+@app.command(epilog="Example: dmoc effects leo_raise --all")
+def effects(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    others: Annotated[
+        bool, typer.Option("--all", help="Also effects of the library that are not in the scene.")
+    ] = False,
+) -> None:
+    """Solve a problem and show what each effect does to the path and what it costs."""
+    import dmoc
+    from dmoc import report
+    from dmoc.influence import influences
+    from dmoc.report_influence import influence_table
+
+    _, case = _problem(problem, settings)
+    solution = dmoc.solve(case, order=order, steps=steps, hold=hold)
+    if not solution.success:
+        _show(solution, None, as_json=False)
+    report.console().print(influence_table(influences(solution, others), solution))
+
+
 @app.command("simulate", epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
 def march(
     problem: Name,

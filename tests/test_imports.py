@@ -80,6 +80,8 @@ MAY_IMPORT = {
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
     "formulation": "mesh problem",
+    "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
+    "report_influence": "EFFECTS influence solution",
     "study": "BASICS NLP MOTION ANSWER formulation long_run",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
     "plot_study": "files study plot_style",
@@ -97,7 +99,7 @@ MAY_IMPORT = {
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli_parts": "library plot solution __init__",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report study plot_study "
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence report_influence study plot_study "
     "report_study sweep exporting cli_parts",
 }
 

@@ -1,0 +1,44 @@
+"""The table of what each effect does and costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from dmoc.effects.base import Effect
+    from dmoc.influence import Influence
+    from dmoc.solution import Solution
+
+
+def influence_table(rows: Sequence[Influence], solution: Solution) -> RenderableType:
+    """One row an effect, and a line that says how to read them."""
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("effect", overflow="fold")
+    table.add_column("in the scene")
+    for name in ("largest acceleration [m/s^2]", "goal moves without it [m]", "instructions", "time share"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(
+            _name(row.effect),
+            "yes" if row.listed else "no",
+            f"{row.acceleration:.3g}",
+            f"{row.displacement:.3g}",
+            f"{row.instructions:+d}",
+            f"{100 * row.time_share:.0f} %",
+        )
+    note = (
+        f"Along the solved path of {solution.provenance.problem_name} (order {solution.order}, "
+        f"{solution.steps} steps). 'Goal moves' compares the independent integrator flying the same controls "
+        "with the effect and without it; for an effect not in the scene, with it added."
+    )
+    return Group(table, Text(""), Text(note))
+
+
+def _name(effect: Effect) -> str:
+    """The effect's name and numbers, without its description."""
+    return effect.words().split("(", 1)[-1].removesuffix(")")

@@ -1,0 +1,40 @@
+"""What an effect is said to do is what it does: held to closed forms."""
+
+import numpy as np
+import pytest
+
+from dmoc import LinearDrag, PointGravity, State, TransferProblem, UniformGravity, solve
+from dmoc.influence import EARTH_MU, candidates, influences
+
+
+def test_leaving_out_gravity_moves_the_goal_by_the_fall():
+    fall = TransferProblem(2.0, State((0, 0), (1, 0)), State((4, 1), (1, 0)), 3.0, [UniformGravity((0, -9.81))])
+    (found,) = influences(solve(fall, order=4, steps=10))
+    assert found.acceleration == pytest.approx(9.81, rel=1e-12)
+    assert found.displacement == pytest.approx(0.5 * 9.81 * 9.0, rel=1e-9)
+    assert found.listed and found.instructions > 0
+
+
+def test_an_effect_of_no_strength_moves_nothing():
+    scene = TransferProblem(2.0, State((0, 0), (1, 0)), State((4, 1), (1, 0)), 3.0, [LinearDrag(0.0)])
+    (found,) = influences(solve(scene, order=4, steps=10))
+    assert (found.acceleration, found.displacement) == (0.0, pytest.approx(0.0, abs=1e-12))
+
+
+def test_around_the_earth_the_library_offers_what_is_missing():
+    radius = 7e6
+    speed = np.sqrt(EARTH_MU / radius)
+    orbit = TransferProblem(
+        500.0, State((radius, 0, 0), (0, speed, 0)), State((-radius, 0, 0), (0, -speed, 0)),
+        np.pi * radius / speed, [PointGravity(EARTH_MU)],
+    )  # fmt: skip
+    rows = influences(solve(orbit, order=6, steps=20), others=True)
+    names = [type(row.effect).__name__ for row in rows]
+    assert names[0] == "PointGravity" and {"J2", "ThirdBody", "Drag", "RadiationPressure"} <= set(names)
+    assert [row.listed for row in rows] == [True] + [False] * (len(rows) - 1)
+    oblateness = rows[names.index("J2")]
+    # Vallado, Fundamentals of Astrodynamics: 3/2 mu J2 R^2 / r^4 in the equatorial plane
+    assert oblateness.acceleration == pytest.approx(
+        1.5 * EARTH_MU * 1.08263e-3 * 6.378137e6**2 / radius**4, rel=1e-3
+    )
+    assert candidates(TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0)) == []
