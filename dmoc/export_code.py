@@ -13,6 +13,14 @@ import numpy as np
 from dmoc.export_functions import Exported, Scene
 from dmoc.export_solver import Planner
 
+PREFACE = """\
+/* CasADi lends the addresses of local variables to the functions it calls; GCC 12 and later take some for
+   addresses that outlive the call. */
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12
+#pragma GCC diagnostic ignored "-Wdangling-pointer"
+#endif
+"""
+
 HEADER = """\
 /* {name}: {about}
 {documentation}
@@ -67,10 +75,12 @@ int main(void) {{
 
 def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) -> None:
     """functions.c, functions.h, transfer.h and main.c of step, rollout and residual, in a folder."""
-    generator = ca.CodeGenerator("functions.c", {"with_header": True, "avoid_stack": True})
+    generator = ca.CodeGenerator("functions.c", {"with_header": True})
     for exported in functions:
         generator.add(exported.function)
     generator.generate(f"{folder}{os.sep}")
+    source = folder / "functions.c"
+    source.write_text(PREFACE + source.read_text())
     (folder / "transfer.h").write_text(_header(planner.scene, functions))
     by_name = {exported.function.name(): exported.function for exported in functions}
     (folder / "main.c").write_text(_example(planner, by_name["rollout"], by_name["residual"]))
