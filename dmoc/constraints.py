@@ -205,8 +205,8 @@ class ApproachCone(Constraint):
         return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
 
     def words(self) -> str:
-        angle = np.degrees(self.half_angle)
-        return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {self.axis}"
+        angle, axis = np.degrees(self.half_angle), _numbers(self.axis)
+        return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {axis}"
 
 
 def _need(part: Any, argument: str, given: int, dimension: int) -> None:
@@ -218,4 +218,8 @@ def _need(part: Any, argument: str, given: int, dimension: int) -> None:
 
 
 def _point(values: tuple) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ") m"
+    return f"{_numbers(values)} m"
+
+
+def _numbers(values: tuple) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

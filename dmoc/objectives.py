@@ -207,7 +207,11 @@ class WeightedSum(Objective):
     @property
     def formula(self) -> str:
         """Such as `0.5 Effort + 2 Time`."""
-        words = [f"{'-' if w < 0 else '+'} {abs(w):g} {type(term).__name__}" for w, term in self.parts]
+        sizes = ["" if abs(weight) == 1 else f"{abs(weight):g} " for weight, _ in self.parts]
+        words = [
+            f"{'-' if weight < 0 else '+'} {size}{type(term).__name__}"
+            for size, (weight, term) in zip(sizes, self.parts, strict=True)
+        ]
         return " ".join(words).removeprefix("+ ")
 
     def check_dimension(self, dimension: int) -> None:

@@ -58,6 +58,7 @@ def test_a_sum_is_minimised_or_maximised_as_its_terms_are():
     assert (FinalMass() - 0.1 * Time()).sense == -1
     assert (2 * (FinalRadius() - 3 * Effort())).terms == ((2.0, FinalRadius()), (-6.0, Effort()))
     assert (0.5 * Effort() + 2 * Time()).words() == "Least 0.5 Effort + 2 Time"
+    assert (FinalMass() - 0.1 * Time()).words() == "Largest FinalMass - 0.1 Time"
     assert (Effort() + 2 * Effort()).unit_with(FreeForce()) == "N^2 s"
     for mixed in (lambda: Effort() + FinalMass(), lambda: Effort() - Time()):
         with pytest.raises(ValueError, match="subtract what is maximised"):
