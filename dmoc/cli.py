@@ -89,6 +89,9 @@ def solve(
     out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
     guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Guesses to try on a coarse mesh; the best optimum is refined.")
+    ] = 1,
     as_json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,
 ) -> None:
@@ -102,8 +105,10 @@ def solve(
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
         file, case = _problem(problem, settings)
-        start = None if guess is None else dmoc.load(guess)
+        start: Any = None if guess is None else dmoc.load(guess)
         unit = case.objective.unit_with(case.actuator)
+        if starts > 1:
+            start = _best_start(case, starts, order or 2, hold, start, None if as_json or quiet else unit)
         with report.live_line(not (as_json or quiet), unit) as progress:
             solution = dmoc.solve(
                 case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
@@ -133,7 +138,7 @@ def effects(
     import dmoc
     from dmoc import report
     from dmoc.influence import influences
-    from dmoc.report_influence import influence_table
+    from dmoc.report_tables import influence_table
 
     _, case = _problem(problem, settings)
     solution = dmoc.solve(case, order=order, steps=steps, hold=hold)
@@ -255,6 +260,18 @@ def _problem(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
     values = parse_settings(settings or ())
     file = load_problem(name)
     return file, file.make(**values)
+
+
+def _best_start(case: Any, starts: int, order: int, hold: bool, guess: Any, unit: str | None) -> Any:
+    """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
+    from dmoc import report
+    from dmoc.report_tables import optima_table
+    from dmoc.starts import local_optima
+
+    found = local_optima(case, starts, order, hold, guess)
+    if unit is not None:
+        report.console().print(optima_table(found, unit))
+    return found[0].path if found else guess
 
 
 def _attached(path: Path, source: str | None) -> Solution:

@@ -69,7 +69,10 @@ MAY_IMPORT = {
     "ipopt": "BASICS mesh problem transcription",
     "solution": "BASICS mesh problem results",  # results: save and load, see ALLOWED_CYCLES
     "results": "BASICS mesh problem solution",
-    "climb": "BASICS NLP MOTION solution",
+    "relaxation": "BASICS NLP",
+    "diagnose": "BASICS PARTS NLP relaxation",
+    "faults": "BASICS PARTS EFFECTS NLP",
+    "climb": "BASICS NLP MOTION solution diagnose faults",
     "refine": "BASICS NLP MOTION solution climb",
     "solver": "BASICS NLP MOTION solution climb refine",
     # what is judged: never with the solver's own words
@@ -80,8 +83,9 @@ MAY_IMPORT = {
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
     "formulation": "mesh problem",
+    "starts": "BASICS NLP MOTION climb coasting constraints",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
-    "report_influence": "EFFECTS influence solution",
+    "report_tables": "EFFECTS influence solution starts",
     "study": "BASICS NLP MOTION ANSWER formulation long_run",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
     "plot_study": "files study plot_style",
@@ -99,7 +103,7 @@ MAY_IMPORT = {
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli_parts": "library plot solution __init__",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence report_influence study plot_study "
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts report_tables study plot_study "
     "report_study sweep exporting cli_parts",
 }
 

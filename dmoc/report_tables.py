@@ -1,4 +1,4 @@
-"""The table of what each effect does and costs."""
+"""Tables of single verbs: what each effect does and costs, the optima that several starts led to."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dmoc.effects.base import Effect
     from dmoc.influence import Influence
     from dmoc.solution import Solution
+    from dmoc.starts import Optimum
 
 
 def influence_table(rows: Sequence[Influence], solution: Solution) -> RenderableType:
@@ -42,3 +43,13 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
 def _name(effect: Effect) -> str:
     """The effect's name and numbers, without its description."""
     return effect.words().split("(", 1)[-1].removesuffix(")")
+
+
+def optima_table(found: Sequence[Optimum], unit: str) -> RenderableType:
+    """The distinct optima on the coarse mesh, the best first; it is refined."""
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column(f"objective [{unit}]", justify="right")
+    table.add_column("starts that led there", overflow="fold")
+    for optimum in found:
+        table.add_row(f"{optimum.objective:.8g}", ", ".join(optimum.starts))
+    return Group(Text("Local optima found on the coarse mesh; the first is refined"), table, Text(""))
