@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run, worst_rows
+from dmoc.diagnose import Cause, cause_of
+from dmoc.faults import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
+from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
@@ -20,6 +22,11 @@ from dmoc.transcription import NLP, transcribe_onto, units_of
 COARSEST_NODES = 100
 FINER = 4
 WIDEST_ROUNDING = 1e-2
+# How far beyond its limits a transfer on a coarse mesh is given up for good, and up to how many nodes it is
+# worth while to find out: the error of the coarse mesh is far below the one, the time small up to the other.
+HOPELESS, MOST_EXPLAINED = 0.05, 2000
+# Statuses that do not tell whether there is a path at all.
+UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
 
 # What to try, in words, for each way Ipopt can end.
 ADVICE = {
@@ -44,6 +51,7 @@ class Climb:
         self.dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
         self.interrupt = Interrupt()
         self.levels: list[Level] = []
+        self.cause: Cause | None = None
         self.nlp: NLP
         self.answer: Answer
 
@@ -54,21 +62,37 @@ class Climb:
 
     def up_to(self, first: Guess) -> bool:
         """Solve on the mesh of a first guess, by way of coarser meshes unless it brings multipliers along."""
+        refuse_undefined_motion(self.dynamics, self.problem, first)
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
         if first.multipliers:
-            return self.solve_on(first)
+            return self.solve_on(first) or self._explained(first, None)
         known, solved = first, False
         for mesh, rounding in _stages(self._meshes(first), self.problem.actuator.smoothing):
-            solved = self.solve_on(known.onto(mesh, first.order, first.hold), rounding)
-            if self.answer.status == "stopped":
-                return False
-            if not solved and self.problem.free_duration:
+            start = known.onto(mesh, first.order, first.hold)
+            solved = self.solve_on(start, rounding)
+            if not solved and self.problem.free_duration and self.answer.status != "stopped":
                 longer = min(self.problem.duration_bounds[1], 10 * first.duration)
                 again = replace(first.onto(mesh, first.order, first.hold), duration=longer)
                 solved = self.solve_on(again, rounding)
+            solved = solved or self._explained(start, rounding)
+            hopeless = self.cause is not None and HOPELESS < self.cause.excess < np.inf
+            if self.answer.status == "stopped" or (not solved and hopeless):
+                return False
             # a coarse mesh may have no path where a finer one does: then go on from the first guess
             known = self.path if solved else first
         return solved
+
+    def _explained(self, start: Guess, rounding: float | None) -> bool:
+        """Say why there is no path near a guess; where there is one, solve again from it."""
+        limited = any("max_" in name for name in self.options or ())
+        unknown = self.answer.status in UNEXPLAINED and not limited
+        if not unknown or self.cause is not None or len(start.position) > MOST_EXPLAINED:
+            return False
+        cause = cause_of(self._rounded(rounding), start)
+        if cause.path is not None:
+            return self.solve_on(cause.path, rounding)
+        self.cause = cause
+        return False
 
     def solve_on(self, guess: Guess, rounding: float | None = None) -> bool:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
@@ -82,11 +106,10 @@ class Climb:
             self.answer = replace(self.answer, status="stopped")
             return False
         begun = time.perf_counter()
-        problem = self.problem
-        if rounding is not None:
-            engine: Any = problem.actuator
-            problem = replace(problem, actuator=replace(engine, smoothing=rounding))
+        problem = self._rounded(rounding)
         self.nlp = transcribe_onto(problem, guess, units_of(problem, guess))
+        if not self.levels:
+            refuse_undefined_rows(self.nlp, problem, guess)
         watch = Watch(self.nlp, self.progress, self.interrupt)
         solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch)
         built = time.perf_counter() - begun
@@ -96,6 +119,13 @@ class Climb:
             Level(guess.order, steps, answer.iterations, objective, built, answer.seconds, answer.status)
         )
         return answer.status == "solved"
+
+    def _rounded(self, rounding: float | None) -> TransferProblem:
+        """The problem with this rounding of |F| at zero."""
+        if rounding is None:
+            return self.problem
+        engine: Any = self.problem.actuator
+        return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
     def _meshes(self, first: Guess) -> list[np.ndarray]:
         """Meshes from coarse to the final one, each about four times finer than the one before.
@@ -124,6 +154,7 @@ class Climb:
         path, answer, problem = self.path, self.answer, self.problem
         momentum, velocity = end_momenta(self.dynamics, path, problem.start_time)
         success = answer.status == "solved"
+        reason = "" if self.cause is None else self.cause.words()
         return Solution(
             problem=problem,
             path=path,
@@ -133,9 +164,9 @@ class Climb:
             objective=self.nlp.objective(answer.objective),
             success=success,
             status=answer.status,
-            message="a local optimum" if success else ADVICE[answer.status],
+            message="a local optimum" if success else reason or ADVICE[answer.status],
             ladder=tuple(self.levels),
-            worst=() if success else worst_rows(self.nlp, problem, answer.x, answer.g),
+            worst=() if success else worst_in_units(self.nlp, problem, answer.x, answer.g),
             provenance=Provenance.of(problem, self.options),
             **found,
         )

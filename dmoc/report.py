@@ -164,9 +164,9 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
     advice = Text(f"What to try: {solution.message}.")
     if quiet:
         return Group(head, advice)
-    worst = _table("worst rows of the last iterate", "violation (scaled)")
-    for name, violation in solution.worst:
-        worst.add_row(name, f"{violation:.2e}")
+    worst = _table("worst rows of the last iterate", "violation")
+    for name, violation, unit in solution.worst:
+        worst.add_row(name, f"{violation:.2e} {unit}")
     return Group(ladder(solution), Text(), worst, Text(), *_files(written), head, advice)
 
 

@@ -107,7 +107,7 @@ def from_dataset(data: Any) -> Solution:
         str(facts["status"]),
         str(facts["message"]),
         tuple(Level(**level) for level in json.loads(facts["ladder"])),
-        tuple((str(name), float(size)) for name, size in json.loads(facts["worst"])),
+        tuple((str(name), float(size), str(unit)) for name, size, unit in json.loads(facts["worst"])),
         tolerance=json.loads(facts["tolerance"]),
         error=Error(**error) if (error := json.loads(facts["error"])) else None,
         reason=str(facts["reason"]),

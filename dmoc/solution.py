@@ -118,8 +118,8 @@ class Solution:
         What the solver said, and what to try if it failed.
     ladder : tuple of Level
         The meshes on the way, coarse to fine.
-    worst : tuple of (str, float)
-        Names of the worst scaled constraint violations of a failed solve, with their sizes.
+    worst : tuple of (str, float, str)
+        The worst violated rows and bounds of a failed solve, worst first: name, size and unit.
     tolerance, error, reason
         What accuracy was asked for, the estimated errors, and why this mesh; empty without a tolerance.
     provenance : Provenance
@@ -135,7 +135,7 @@ class Solution:
     status: str
     message: str
     ladder: tuple[Level, ...]
-    worst: tuple[tuple[str, float], ...] = ()
+    worst: tuple[tuple[str, float, str], ...] = ()
     tolerance: float | None = None
     error: Error | None = None
     reason: str = ""
