@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.diagnose import Cause, cause_of
 from dmoc.faults import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
+from dmoc.guess import starting_guess
 from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
@@ -60,14 +61,19 @@ class Climb:
         """The last answer."""
         return path_of(self.nlp, self.problem, self.answer)
 
-    def up_to(self, first: Guess) -> bool:
-        """Solve on the mesh of a first guess, by way of coarser meshes unless it brings multipliers along."""
+    def up_to(self, first: Guess, given: Any = None) -> bool:
+        """Solve on the mesh of a first guess, by way of coarser meshes unless it brings multipliers along.
+
+        On the coarsest the guess is made anew from what it was made from, `given`: brought there from
+        a finer mesh its controls would no longer fit its path.
+        """
         refuse_undefined_motion(self.dynamics, self.problem, first)
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
         if first.multipliers:
             return self.solve_on(first) or self._explained(first, None)
-        known, solved = first, False
-        for mesh, rounding in _stages(self._meshes(first), self.problem.actuator.smoothing):
+        stages = _stages(self._meshes(first), self.problem.actuator.smoothing)
+        known, solved = starting_guess(self.problem, stages[0][0], first.order, first.hold, given), False
+        for mesh, rounding in stages:
             start = known.onto(mesh, first.order, first.hold)
             solved = self.solve_on(start, rounding)
             if not solved and self.problem.free_duration and self.answer.status != "stopped":

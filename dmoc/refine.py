@@ -35,7 +35,7 @@ def climb_to_tolerance(
     enough = 2 * climb.least_steps(first)
     if steps is None and enough > TRIAL_STEPS:
         first = starting_guess(problem, check_mesh(enough), trial, hold, guess)
-    if not climb.up_to(first):
+    if not climb.up_to(first, guess):
         return climb.solution(tolerance=tol)
     path = climb.path
     corners = _corners(problem, path, climb.levels[-1].objective)

@@ -76,7 +76,7 @@ def solve(
     ends = check_mesh(DEFAULT_STEPS[order] if steps is None else steps, mesh)
     first = starting_guess(problem, ends, order, hold, guess)
     with climb.interrupt:
-        climb.up_to(first)
+        climb.up_to(first, guess)
     return climb.solution()
 
 

@@ -60,7 +60,7 @@ def local_optima(
     for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
         climb = Climb(problem, options)
         with climb.interrupt:
-            solved = climb.up_to(start)
+            solved = climb.up_to(start, start)
         if climb.answer.status == "stopped":
             break
         if solved:

@@ -88,7 +88,7 @@ MAY_IMPORT = {
     "report_tables": "EFFECTS influence solution starts",
     "study": "BASICS NLP MOTION ANSWER formulation long_run",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
-    "plot_study": "files study plot_style",
+    "plot_study": "files long_run plot plot_style study",
     "report_study": "report study",
     "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     # what leaves the package
