@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,6 +49,42 @@ class Formulation:
     ends: ca.MX
     controls: ca.MX
     points: tuple[float, ...]
+
+
+Method = Callable[[TransferProblem, int], Formulation]
+
+
+def load_methods(path: Path) -> dict[str, Method]:
+    """Methods by name from a Python file, which is run: its dictionary METHODS.
+
+    Raises
+    ------
+    ValueError
+        If the file is not there, fails, or has no such dictionary.
+    """
+    if not path.is_file():
+        raise ValueError(f"there is no file {path} with other methods; scripts/alternatives.py is one")
+    try:
+        found = runpy.run_path(str(path)).get("METHODS")
+    except Exception as error:
+        raise ValueError(f"{path}: {type(error).__name__}: {error}") from error
+    if not isinstance(found, dict) or not found or not all(map(callable, found.values())):
+        raise ValueError(
+            f"{path} has no dictionary METHODS of functions (problem, steps) that give a dmoc.Formulation"
+        )
+    return found
+
+
+def formulated(name: str, method: Method, problem: TransferProblem, steps: int) -> Formulation:
+    """What a method makes of a problem; ValueError, with its name, if it fails."""
+    try:
+        made = method(problem, steps)
+    except Exception as error:
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ValueError(f"method {name!r}: {kind}{error}") from error
+    if not isinstance(made, Formulation):
+        raise ValueError(f"method {name!r} must return a dmoc.Formulation; it returned {type(made).__name__}")
+    return made
 
 
 def as_nlp(problem: TransferProblem, made: Formulation, steps: int) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 
 from dmoc.climb import Climb
 from dmoc.formulation import Formulation as Formulation
-from dmoc.formulation import as_nlp, path_of
+from dmoc.formulation import Method, as_nlp, formulated, path_of
 from dmoc.guess import starting_guess
 from dmoc.ipopt import STATUS, make_solver
 from dmoc.lobatto import scheme
@@ -35,9 +35,6 @@ STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 
 OTHER_STEPS = (25, 50, 100, 200, 400)
 REFERENCE_STEPS = 100
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
-
-
-Method = Callable[[TransferProblem, int], Formulation]
 
 
 @dataclass(frozen=True)
@@ -92,7 +89,7 @@ class Trial:
 def work_precision(
     problem: TransferProblem,
     orders: Sequence[int] = (2, 4, 6, 8),
-    steps: Sequence[int] | None = None,
+    steps: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
     repeats: int = 3,
     against: Mapping[str, Method] | Sequence[tuple[str, Method]] = (),
     reference: float | None = None,
@@ -108,8 +105,9 @@ def work_precision(
     problem : TransferProblem
     orders : sequence of int
         Of 2, 4, 6, 8.
-    steps : sequence of int, optional
-        Meshes; by default 100 to 1600 steps at order 2, and down to 8 to 64 at order 8.
+    steps : sequence of int, or mapping, optional
+        Meshes, for all or by the method's name ("order 2", ...); by default 100 to 1600 steps at order 2,
+        and down to 8 to 64 at order 8.
     repeats : int
         How often each solve is timed; the median counts.
     against : mapping or pairs
@@ -131,22 +129,21 @@ def work_precision(
     """
     if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
         raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
-    meshes = {order: steps or STEPS[scheme(order).order] for order in orders}
-    for count in steps or ():
-        check_mesh(count)
+    meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
+    others = dict(against)
     runs: list[tuple[tuple, Callable[[], _Run]]] = [
         (
-            (f"order {order}" + ("" if climbs else ", cold"), order, count, climbs),
+            (name + ("" if climbs else ", cold"), order, count, climbs),
             partial(_own, problem, order, count, climbs),
         )
-        for order in orders
-        for count in meshes[order]
+        for order, (name, counts) in zip(orders, meshes.items(), strict=True)
+        for count in counts
         for climbs in ((True, False) if cold else (True,))
     ]
     runs += [
-        ((name, None, count, False), partial(_other, problem, method, count))
-        for name, method in dict(against).items()
-        for count in steps or OTHER_STEPS
+        ((name, None, count, False), partial(_other, problem, name, others[name], count))
+        for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
+        for count in counts
     ]
     value, doubt = best_known(problem) if reference is None else (float(reference), 1e-16)
     rounds = [[run() for _, run in runs] for _ in range(repeats)]
@@ -154,6 +151,15 @@ def work_precision(
         _trial(problem, labels, timed, value, doubt)
         for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
     ]
+
+
+def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+    """Numbers of steps by the name of the method, checked."""
+    chosen = steps if isinstance(steps, Mapping) else {} if steps is None else dict.fromkeys(default, steps)
+    meshes = default | {name: tuple(chosen[name]) for name in default if name in chosen}
+    for count in (count for counts in meshes.values() for count in counts):
+        check_mesh(count)
+    return meshes
 
 
 def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[_Run], value: float, doubt: float) -> Trial:
@@ -250,12 +256,12 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> _Run
     return _Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
 
 
-def _other(problem: TransferProblem, method: Method, steps: int) -> _Run:
+def _other(problem: TransferProblem, name: str, method: Method, steps: int) -> _Run:
     """A solve by another method, with the options and tolerances of dmoc's own."""
 
     def solve_with(options: dict[str, Any]) -> tuple[Formulation, dict, dict, list[float]]:
         times = [time.perf_counter()]
-        made = method(problem, steps)
+        made = formulated(name, method, problem, steps)
         solver = make_solver(as_nlp(problem, made, steps), options)
         (lbx, ubx), (lbg, ubg) = made.bounds, made.row_bounds
         x0 = np.clip(made.guess, lbx, ubx)

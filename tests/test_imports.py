@@ -102,9 +102,10 @@ MAY_IMPORT = {
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli_parts": "library plot solution __init__",
-    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts report_tables study plot_study "
-    "report_study sweep exporting cli_parts",
+    "cli_parts": "plot",
+    "study_command": "cli_parts formulation library plot_study report report_study study",
+    "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts "
+    "report_tables sweep exporting cli_parts study_command",
 }
 
 # one of each pair imports the other inside a function, when it is asked for

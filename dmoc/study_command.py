@@ -1,0 +1,82 @@
+"""`dmoc study`: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+
+def study(
+    problem: Annotated[
+        str, typer.Argument(metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.")
+    ],
+    orders: Annotated[str, typer.Option(metavar="N,N,...", help="Of 2, 4, 6, 8.")] = "2,4,6,8",
+    steps: Annotated[
+        str | None, typer.Option(metavar="N,N,...", help="Numbers of steps; if not given, some for each order.")
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
+    ] = None,
+    cold: Annotated[bool, typer.Option("--cold", help="Also without coarse meshes on the way.")] = False,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each solve is timed; the median counts.")] = 3,
+    reference: Annotated[
+        float | None, typer.Option(help="The true objective; order 8 on a fine mesh if not given.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw error against time here (png, pdf or svg).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write a line a solve here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Measure what accuracy costs in time, for every order on several meshes and for other methods.
+
+    Medians of several runs; whatever else the computer does makes them longer.
+    """
+    from dmoc import report, report_study
+    from dmoc.cli_parts import ends_at_once, writable
+    from dmoc.formulation import load_methods
+    from dmoc.library import load_problem, parse_settings
+    from dmoc.plot_study import save_study
+    from dmoc.study import work_precision
+
+    writable(plot, drawn=True)
+    writable(csv)
+    chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+        case = load_problem(problem).make(**parse_settings(settings or ()))
+        methods = {} if against is None else load_methods(against)
+        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold)
+    if plot is not None:
+        save_study(trials, plot, f"{case.name.replace('_', ' ')}: what accuracy costs in time")
+    if csv is not None:
+        report_study.write_csv(trials, csv)
+    if as_json:
+        print(report.as_json(report_study.study_object(case.name, trials)))
+        return
+    console = report.console()
+    console.print(report_study.study_tables(trials, case.objective.unit_with(case.actuator)))
+    for path in filter(None, (plot, csv)):
+        console.print(f"wrote {path}")
+
+
+def whole_numbers(name: str, text: str) -> list[int]:
+    """The numbers in a text such as `2,4,6`.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"--{name} must be whole numbers with commas, such as 2,4,8; got {text!r}") from None
