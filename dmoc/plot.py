@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from dmoc.files import whole_file
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import step_nodes
-from dmoc.objectives import Time
+from dmoc.objectives import Objective, Time
 from dmoc.plot_path import draw_path, entries_once
 from dmoc.plot_style import (
     AXIS_COLOURS,
@@ -42,7 +43,9 @@ SQUARED = "\u00b2"
 LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
-def save_figure(solution: Solution, path: str | os.PathLike, report: Report | None = None) -> None:
+def save_figure(
+    solution: Solution, path: str | os.PathLike, report: Report | None = None, dpi: float = 150
+) -> None:
     """Draw a solution into a file, whole or not at all.
 
     Parameters
@@ -52,6 +55,8 @@ def save_figure(solution: Solution, path: str | os.PathLike, report: Report | No
         Ends in .png, .pdf or .svg, which decides the format.
     report : Report, optional
         Checks whose outcome is written below the panels.
+    dpi : float
+        Dots per inch of a .png; the page is 13.33 inches wide.
 
     Raises
     ------
@@ -62,7 +67,7 @@ def save_figure(solution: Solution, path: str | os.PathLike, report: Report | No
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     page = figure(solution, report)
     with whole_file(path) as temporary:
-        page.savefig(temporary, dpi=150)
+        page.savefig(temporary, dpi=dpi)
 
 
 def figure(solution: Solution, report: Report | None = None) -> Figure:
@@ -240,11 +245,17 @@ def _headline(solution: Solution) -> str:
     name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
     if not solution.success:
         return f"{name}NOT SOLVED ({solution.status}), the last iterate"
-    kind = "objective" if problem is None else f"least {type(problem.objective).__name__.lower()}"
+    kind = "objective" if problem is None else _wanted(problem.objective)
     words = f"{name}{kind} {solution.objective:.6g} {about.objective_unit.replace('^2', SQUARED)}"
     if not problem or not isinstance(problem.objective, Time):
         words += f", duration {solution.duration:.6g} s"
     return words + (f", final mass {solution.final_mass:.6g} kg" if np.ptp(solution.path.mass) > 0 else "")
+
+
+def _wanted(objective: Objective) -> str:
+    """Such as `least effort` or `greatest final mass`."""
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(objective).__name__).lower()
+    return f"{'least' if objective.sense > 0 else 'greatest'} {name}"
 
 
 def _footnote(solution: Solution, report: Report | None) -> tuple[str, bool]:

@@ -1,0 +1,48 @@
+"""Solve every problem in problems/ from its defaults, draw it, and print the table of the README.
+
+    ./scripts/run python scripts/gallery.py                   # all of them
+    ./scripts/run python scripts/gallery.py goddard           # some; the pictures of the others stay
+
+Pictures go to problems/gallery. The exit code is 1 if a problem is not solved or fails a check.
+"""
+
+import sys
+from pathlib import Path
+
+from dmoc import solve, verify
+from dmoc.docstrings import first_line
+from dmoc.library import load_problem
+from dmoc.plot import save_figure
+from dmoc.solution import Solution
+
+PROBLEMS = Path(__file__).parents[1] / "problems"
+GALLERY = PROBLEMS / "gallery"
+DPI = 90  # 1200 pixels wide
+
+
+def row(name: str, words: str, solution: Solution, holds: bool) -> str:
+    """One line of the table."""
+    seconds = solution.build_s + solution.solve_s
+    value = f"{solution.objective:.6g} {solution.provenance.objective_unit}".replace("^2", "\u00b2").rstrip()
+    found = value if holds else f"{value} (a check fails)" if solution.success else solution.status
+    cells = (f"[{name}](problems/gallery/{name}.png)", words, f"`dmoc solve {name}`", found, f"{seconds:.1f}")
+    return f"| {' | '.join(cells)} |"
+
+
+def main(names: list[str]) -> int:
+    GALLERY.mkdir(exist_ok=True)
+    print("| problem | what it is | command | objective | s |", "|---|---|---|---|---|", sep="\n")
+    worst = 0
+    for name in names or sorted(path.stem for path in PROBLEMS.glob("*.py")):
+        file = load_problem(str(PROBLEMS / f"{name}.py"))
+        solution = solve(file.make())
+        report = verify(solution) if solution.success else None
+        holds = report is not None and report.ok
+        save_figure(solution, GALLERY / f"{name}.png", report, dpi=DPI)
+        print(row(name, first_line(file.docstring).rstrip("."), solution, holds), flush=True)
+        worst |= not holds
+    return worst
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
