@@ -61,6 +61,7 @@ _HOMES = {
     "dmoc.solution": ("Solution", "SolveError", "load"),
     "dmoc.solver": ("solve",),
     "dmoc.study": ("Formulation", "work_precision"),
+    "dmoc.sweeping": ("sweep",),
     "dmoc.transcription": ("NLP", "transcribe"),
     "dmoc.verification": ("Report", "verify"),
 }

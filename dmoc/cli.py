@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
+
+from dmoc import study_command, sweep_command
+from dmoc.cli_parts import (
+    BAD_INPUT,
+    CHECK_FAILED,
+    INTERRUPTED,
+    NOT_SOLVED,
+    SOLVED,
+    ends_at_once,
+    writable,
+)
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
@@ -20,7 +28,6 @@ if TYPE_CHECKING:
 
 # Typer exports only one of its usage errors; this is the class of all of them.
 USAGE_ERROR: Any = typer.BadParameter.__base__
-SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = typer.Typer(
     add_completion=False,
@@ -100,10 +107,10 @@ def solve(
     from dmoc import report
     from dmoc.verification import verify
 
-    _writable(out)
-    _writable(plot, drawn=True)
+    writable(out)
+    writable(plot, drawn=True)
     # what a problem file prints must not come between the lines of the JSON object
-    with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         file, case = _problem(problem, settings)
         start: Any = None if guess is None else dmoc.load(guess)
         unit = case.objective.unit_with(case.actuator)
@@ -170,7 +177,7 @@ def march(
         raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
     _, case = _problem(problem, settings)
     known = None if controls is None else dmoc.load(controls).attach(case)
-    with _ends_at_once():
+    with ends_at_once():
         trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
     report.console().print(report.motion(trajectory, case, coast=known is None))
 
@@ -180,7 +187,7 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.verification import verify
 
-    with redirect_stdout(sys.stderr if as_json else sys.stdout), _ends_at_once():
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = _attached(file, problem)
         verdict = verify(solution)
     _show(solution, verdict, as_json)
@@ -198,7 +205,7 @@ def plot(
     from dmoc.plot import save_figure
 
     target = file.with_suffix(".png") if out is None else out
-    _writable(target, drawn=True)
+    writable(target, drawn=True)
     try:
         solution = _attached(file, problem)
     except ValueError as error:
@@ -235,6 +242,16 @@ def take_away(
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
+
+
+app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
+    sweep_command.sweep
+)
+
+
+app.command("study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png")(
+    study_command.study
+)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
@@ -298,22 +315,6 @@ def _attached(path: Path, source: str | None) -> Solution:
     return attached
 
 
-def _writable(path: Path | None, drawn: bool = False) -> None:
-    """ValueError unless a file can be written there: said before the work, not after it."""
-    if path is None:
-        return
-    folder = path.parent
-    if not folder.is_dir():
-        raise ValueError(f"cannot write {path}: there is no folder {folder}; create it first")
-    if path.is_dir() or not os.access(folder, os.W_OK):
-        raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
-    if drawn:
-        from dmoc.plot import SUFFIXES
-
-        if path.suffix.lower() not in SUFFIXES:
-            raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
-
-
 def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
     """Print the answer and exit with the code that says what it is worth."""
     from dmoc import report
@@ -337,29 +338,6 @@ def _warn(message: str) -> None:
 def _fail(message: str, code: int) -> NoReturn:
     print(" ".join(message.split()), file=sys.stderr)
     sys.exit(code)
-
-
-@contextmanager
-def _ends_at_once() -> Iterator[None]:
-    """Outside a solve, which stops at Ctrl-C and keeps its iterate, it ends the program.
-
-    CasADi would swallow the exception. Nothing is being written here, so nothing is left behind.
-    """
-
-    def end(number: int, frame: Any) -> NoReturn:
-        if sys.stderr.isatty():
-            sys.stderr.write("\r\x1b[2K\x1b[?25h")
-        sys.stderr.write("interrupted\n")
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
-
-    before = signal.getsignal(signal.SIGINT)
-    if before is signal.default_int_handler:
-        signal.signal(signal.SIGINT, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 if __name__ == "__main__":

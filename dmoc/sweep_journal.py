@@ -1,0 +1,179 @@
+"""The journal of a sweep: one line of JSON a finished point, on the disk before the next is begun.
+
+A sweep that is killed at any moment loses the points under way and nothing else. The first line
+says what sweep it is. A line that was cut short, and what follows it, is solved again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+FORMAT = "dmoc sweep journal"
+SUFFIX = ".journal"
+KEPT = "give --restart to begin anew, or another --out"
+
+try:
+    import fcntl
+except ImportError:  # not there on Windows, where nothing then guards against two sweeps into one file
+    fcntl = None  # type: ignore[assignment]
+
+
+class Journal:
+    """Records of the points that are done, by (wave, point); wave 0 is the first try.
+
+    Parameters
+    ----------
+    out : path
+        The result file; the journal stands beside it.
+    facts : dict
+        What sweep it is.
+    restart : bool
+        Forget a journal that is there.
+
+    Raises
+    ------
+    ValueError
+        If the journal that is there belongs to another sweep, or another process writes to it.
+    """
+
+    def __init__(self, out: str | os.PathLike, facts: dict[str, Any], restart: bool = False):
+        self.path = journal_of(out)
+        self.records: dict[tuple[int, int], dict[str, Any]] = {}
+        self._places: dict[tuple[int, int], int] = {}
+        if not self.path.parent.is_dir():
+            raise ValueError(f"cannot write {out}: there is no folder {self.path.parent}; create it first")
+        if Path(out).is_dir():
+            raise ValueError(f"cannot write {out}: it is a folder; add a file name")
+        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            self._begin({"format": FORMAT, "version": 1, **facts}, restart)
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+    def append(self, wave: int, point: int, record: dict[str, Any], path: str | None) -> None:
+        """Keep a finished point; it is on the disk when this returns."""
+        record = _finite(record)
+        entry = {"wave": wave, "point": point, "record": record, "path": path}
+        self._places[wave, point] = self._write(entry)
+        self.records[wave, point] = record
+
+    def path_at(self, wave: int, point: int) -> str | None:
+        """The path of a finished point, read again from the disk."""
+        os.lseek(self._file, self._places[wave, point], os.SEEK_SET)
+        with os.fdopen(os.dup(self._file), "rb") as stream:
+            return json.loads(stream.readline())["path"]
+
+    def remove(self) -> None:
+        """Forget it all: the result is written."""
+        self.path.unlink()
+
+    def _begin(self, facts: dict[str, Any], restart: bool) -> None:
+        if fcntl is not None:
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise ValueError(f"another sweep is writing to {self.path}; wait for it to end") from None
+        with open(self.path, "rb") as stream:
+            end = self._read(stream, None if restart else facts)
+        os.ftruncate(self._file, end)
+        if not end:
+            self._write(facts)
+            _settle(self.path.parent)
+
+    def _read(self, stream: Any, facts: dict[str, Any] | None) -> int:
+        """Take over what is there, unless it is to be forgotten; where the good lines end."""
+        head = stream.readline()
+        start = json.dumps({"format": FORMAT})[:-1].encode()
+        if not head.startswith(start) and not (start.startswith(head) and not head.endswith(b"\n")):
+            raise ValueError(f"{self.path} is not the journal of a sweep; move it away, or give another --out")
+        if facts is None or not head.endswith(b"\n"):
+            return 0
+        if changes := differences(_parsed(head) or {}, json.loads(json.dumps(facts))):
+            raise ValueError(f"{self.path} belongs to another sweep: {'; '.join(changes)}; {KEPT}")
+        end = len(head)
+        for line in stream:
+            entry = _parsed(line)
+            if entry is None:
+                break
+            key = entry["wave"], entry["point"]
+            self.records[key], self._places[key] = entry["record"], end
+            end += len(line)
+        return end
+
+    def _write(self, entry: dict[str, Any]) -> int:
+        """Append one line, and where it begins."""
+        place = os.lseek(self._file, 0, os.SEEK_END)
+        line = json.dumps(entry, allow_nan=False).encode() + b"\n"
+        while line:
+            line = line[os.write(self._file, line) :]
+        os.fsync(self._file)
+        return place
+
+
+def journal_of(out: str | os.PathLike) -> Path:
+    """Where the journal of a result file stands."""
+    return Path(out).with_name(Path(out).name + SUFFIX)
+
+
+def differences(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
+    """What sets two sweeps apart, in words."""
+    found = []
+    for name in dict.fromkeys([*old, *new]):
+        was, now = old.get(name), new.get(name)
+        if was == now:
+            continue
+        if name == "source_hash":
+            found.append("the problem file has changed since")
+        elif isinstance(was, dict) and isinstance(now, dict):
+            found += differences(was, now)
+        else:
+            found.append(f"{name} was {_words(was)} and is now {_words(now)}")
+    return found
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, list) and len(value) > 3:
+        return f"{len(value)} values from {value[0]} to {value[-1]}"
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return "not given" if value is None else str(value)
+
+
+def _parsed(line: bytes) -> dict[str, Any] | None:
+    """The entry of a line, or None if it was cut short or is none."""
+    try:
+        entry = json.loads(line) if line.endswith(b"\n") else None
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) else None
+
+
+def _finite(record: dict[str, Any]) -> dict[str, Any]:
+    """Numbers that are not finite become null: JSON has no word for them."""
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in record.items()
+    }
+
+
+def _settle(folder: Path) -> None:
+    """The name of a new file on the disk too."""
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(place)
+    finally:
+        os.close(place)
