@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from dmoc import study_command, sweep_command
+from dmoc import study_command
 from dmoc.cli_parts import (
     BAD_INPUT,
     CHECK_FAILED,
@@ -244,14 +244,9 @@ def take_away(
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
 
 
-app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
-    sweep_command.sweep
-)
-
-
-app.command("study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png")(
-    study_command.study
-)
+app.command(
+    "study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"
+)(study_command.study)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
