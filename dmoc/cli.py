@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from dmoc import study_command
+from dmoc import study_command, sweep_command
 from dmoc.cli_parts import (
     BAD_INPUT,
     CHECK_FAILED,
@@ -242,6 +242,11 @@ def take_away(
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
+
+
+app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
+    sweep_command.sweep
+)
 
 
 app.command(
