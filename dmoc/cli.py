@@ -5,55 +5,43 @@ from __future__ import annotations
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 from dmoc import study_command, sweep_command
 from dmoc.cli_parts import (
     BAD_INPUT,
-    CHECK_FAILED,
     INTERRUPTED,
-    NOT_SOLVED,
     SOLVED,
+    File,
+    Hold,
+    Json,
+    Name,
+    Order,
+    Settings,
+    Source,
+    Steps,
+    attached,
+    best_start,
     ends_at_once,
+    fail,
+    problem_of,
+    show_answer,
+    warn,
     writable,
 )
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
-if TYPE_CHECKING:
-    from dmoc.library import ProblemFile
-    from dmoc.solution import Solution
-    from dmoc.verification import Report
 
 # Typer exports only one of its usage errors; this is the class of all of them.
 USAGE_ERROR: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
-    add_completion=False,
     pretty_exceptions_enable=False,
     help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
     epilog="Exit codes: 0 solved and every check holds, 2 bad input, 3 not solved, 4 a check failed.",
 )
-
-Name = Annotated[
-    str, typer.Argument(metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.")
-]
-File = Annotated[Path, typer.Argument(metavar="FILE", help="A solution saved with `dmoc solve --out`.")]
-Source = Annotated[
-    str | None,
-    typer.Option("--problem", metavar="PROBLEM", help="The problem, if not the one named in the file."),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
-]
-Order = Annotated[int | None, typer.Option(help="2 (the default), 4, 6 or 8.")]
-Steps = Annotated[
-    int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
-]
-Hold = Annotated[bool, typer.Option("--hold", help="Forces constant over each step.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
 @app.command("list", epilog="Example: dmoc list")
@@ -74,7 +62,7 @@ def show(problem: Name, settings: Settings = None) -> None:
     from dmoc.solver import DEFAULT_STEPS
     from dmoc.transcription import transcribe
 
-    file, case = _problem(problem, settings)
+    file, case = problem_of(problem, settings)
     nlp = transcribe(case, DEFAULT_STEPS[2])
     console = report.console()
     tables = (report.scene(case), report.parameters(file.parameters), report.sizes(nlp))
@@ -111,11 +99,11 @@ def solve(
     writable(plot, drawn=True)
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
-        file, case = _problem(problem, settings)
+        file, case = problem_of(problem, settings)
         start: Any = None if guess is None else dmoc.load(guess)
         unit = case.objective.unit_with(case.actuator)
         if starts > 1:
-            start = _best_start(case, starts, order or 2, hold, start, None if as_json or quiet else unit)
+            start = best_start(case, starts, order or 2, hold, start, None if as_json or quiet else unit)
         with report.live_line(not (as_json or quiet), unit) as progress:
             solution = dmoc.solve(
                 case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
@@ -127,7 +115,7 @@ def solve(
         from dmoc.plot import save_figure
 
         save_figure(solution, plot, verdict)
-    _show(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
+    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
 
 
 @app.command(epilog="Example: dmoc effects leo_raise --all")
@@ -147,10 +135,10 @@ def effects(
     from dmoc.influence import influences
     from dmoc.report_tables import influence_table
 
-    _, case = _problem(problem, settings)
+    _, case = problem_of(problem, settings)
     solution = dmoc.solve(case, order=order, steps=steps, hold=hold)
     if not solution.success:
-        _show(solution, None, as_json=False)
+        show_answer(solution, None, as_json=False)
     report.console().print(influence_table(influences(solution, others), solution))
 
 
@@ -175,7 +163,7 @@ def march(
         check_mesh(steps)
     if controls is not None and (order, steps, hold) != (None, None, False):
         raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
-    _, case = _problem(problem, settings)
+    _, case = problem_of(problem, settings)
     known = None if controls is None else dmoc.load(controls).attach(case)
     with ends_at_once():
         trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
@@ -188,9 +176,9 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     from dmoc.verification import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
-        solution = _attached(file, problem)
+        solution = attached(file, problem)
         verdict = verify(solution)
-    _show(solution, verdict, as_json)
+    show_answer(solution, verdict, as_json)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
@@ -207,12 +195,12 @@ def plot(
     target = file.with_suffix(".png") if out is None else out
     writable(target, drawn=True)
     try:
-        solution = _attached(file, problem)
+        solution = attached(file, problem)
     except ValueError as error:
         solution = dmoc.load(file)
         if problem is not None:
             raise
-        _warn(f"zones and limits are left out: {error}")
+        warn(f"zones and limits are left out: {error}")
     save_figure(solution, target)
     report.console().print(f"wrote {target}")
 
@@ -236,12 +224,22 @@ def take_away(
     import dmoc
     from dmoc import report
 
-    _, case = _problem(problem, settings)
+    _, case = problem_of(problem, settings)
     paths = dmoc.export(case, folder, 2 if order is None else order, steps, hold, c=not no_c)
     functions = json.loads(paths[0].read_text())["functions"]
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
+
+
+@app.command(epilog="Example: dmoc doctor")
+def doctor() -> None:
+    """Say what this computer has: versions, linear solvers, a C compiler, cores, and how fast it solves."""
+    from dmoc import report
+    from dmoc.doctor import examine
+    from dmoc.report_tables import findings_table
+
+    report.console().print(findings_table(examine()))
 
 
 app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
@@ -260,83 +258,13 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     try:
         code = app(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
-        _fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
+        fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
     except (ValueError, OSError) as error:
-        _fail(f"error: {error}", BAD_INPUT)
+        fail(f"error: {error}", BAD_INPUT)
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:
-        _fail("interrupted", INTERRUPTED)
-    sys.exit(code)
-
-
-def _problem(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
-    """The problem file, and the problem made with the values of --set."""
-    from dmoc.library import load_problem, parse_settings
-
-    values = parse_settings(settings or ())
-    file = load_problem(name)
-    return file, file.make(**values)
-
-
-def _best_start(case: Any, starts: int, order: int, hold: bool, guess: Any, unit: str | None) -> Any:
-    """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
-    from dmoc import report
-    from dmoc.report_tables import optima_table
-    from dmoc.starts import local_optima
-
-    found = local_optima(case, starts, order, hold, guess)
-    if unit is not None:
-        report.console().print(optima_table(found, unit))
-    return found[0].path if found else guess
-
-
-def _attached(path: Path, source: str | None) -> Solution:
-    """A saved solution with its problem: the one given, else the one it names.
-
-    The name in a file is only ever looked up in the problem folders: a file must not choose what is run.
-    """
-    import dmoc
-    from dmoc.library import load_problem
-
-    solution = dmoc.load(path)
-    known = solution.provenance
-    if source is None and not known.problem_name.isidentifier():
-        raise ValueError(f"{path} names no problem file ({known.problem_name!r}); give it with --problem PATH")
-    try:
-        file = load_problem(source or known.problem_name)
-    except ValueError as error:
-        raise ValueError(
-            error if source else f"{error}; {path} was made from it: give it with --problem PATH"
-        ) from None
-    attached = solution.attach(file.make(**known.parameters))
-    if known.source_hash != file.source_hash:
-        _warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
-    return attached
-
-
-def _show(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
-    """Print the answer and exit with the code that says what it is worth."""
-    from dmoc import report
-
-    console = report.console()
-    if as_json:
-        print(report.as_json(report.result(solution, verdict)))
-    elif solution.success and verdict is not None:
-        console.print(report.answer(solution, verdict, quiet, written))
-    else:
-        console.print(report.failure(solution, quiet, written))
-    if not solution.success:
-        raise typer.Exit(INTERRUPTED if solution.status == "stopped" else NOT_SOLVED)
-    raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
-
-
-def _warn(message: str) -> None:
-    print(f"warning: {' '.join(message.split())}", file=sys.stderr)
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    print(" ".join(message.split()), file=sys.stderr)
+        fail("interrupted", INTERRUPTED)
     sys.exit(code)
 
 

@@ -1,4 +1,4 @@
-"""What the commands share: where they may write, and what Ctrl-C does."""
+"""What the commands share: options, the way to a problem and to its answer, and what Ctrl-C does."""
 
 from __future__ import annotations
 
@@ -8,9 +8,117 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+if TYPE_CHECKING:
+    from dmoc.library import ProblemFile
+    from dmoc.solution import Solution
+    from dmoc.verification import Report
 
 SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+
+
+def names_like(begun: str) -> list[str]:
+    """Names of problem files, for the completion of a shell."""
+    from dmoc.library import catalogue
+
+    return [name for name, _ in catalogue() if name.startswith(begun)]
+
+
+Name = Annotated[
+    str,
+    typer.Argument(
+        metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
+    ),
+]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="A solution saved with `dmoc solve --out`.")]
+Source = Annotated[
+    str | None,
+    typer.Option("--problem", metavar="PROBLEM", help="The problem, if not the one named in the file."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
+]
+Order = Annotated[int | None, typer.Option(help="2 (the default), 4, 6 or 8.")]
+Steps = Annotated[
+    int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
+]
+Hold = Annotated[bool, typer.Option("--hold", help="Forces constant over each step.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
+    """The problem file, and the problem made with the values of --set."""
+    from dmoc.library import load_problem, parse_settings
+
+    values = parse_settings(settings or ())
+    file = load_problem(name)
+    return file, file.make(**values)
+
+
+def best_start(case: Any, starts: int, order: int, hold: bool, guess: Any, unit: str | None) -> Any:
+    """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
+    from dmoc import report
+    from dmoc.report_tables import optima_table
+    from dmoc.starts import local_optima
+
+    found = local_optima(case, starts, order, hold, guess)
+    if unit is not None:
+        report.console().print(optima_table(found, unit))
+    return found[0].path if found else guess
+
+
+def attached(path: Path, source: str | None) -> Solution:
+    """A saved solution with its problem: the one given, else the one it names.
+
+    The name in a file is only ever looked up in the problem folders: a file must not choose what is run.
+    """
+    import dmoc
+    from dmoc.library import load_problem
+
+    solution = dmoc.load(path)
+    known = solution.provenance
+    if source is None and not known.problem_name.isidentifier():
+        raise ValueError(f"{path} names no problem file ({known.problem_name!r}); give it with --problem PATH")
+    try:
+        file = load_problem(source or known.problem_name)
+    except ValueError as error:
+        raise ValueError(
+            error if source else f"{error}; {path} was made from it: give it with --problem PATH"
+        ) from None
+    attached = solution.attach(file.make(**known.parameters))
+    if known.source_hash != file.source_hash:
+        warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
+    return attached
+
+
+def show_answer(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
+    """Print the answer and exit with the code that says what it is worth."""
+    from dmoc import report
+
+    console = report.console()
+    if as_json:
+        print(report.as_json(report.result(solution, verdict)))
+    elif solution.success and verdict is not None:
+        console.print(report.answer(solution, verdict, quiet, written))
+    else:
+        console.print(report.failure(solution, quiet, written))
+    if not solution.success:
+        raise typer.Exit(INTERRUPTED if solution.status == "stopped" else NOT_SOLVED)
+    raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
+
+
+def warn(message: str) -> None:
+    print(f"warning: {' '.join(message.split())}", file=sys.stderr)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
 
 
 def writable(path: Path | None, drawn: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Tables of single verbs: what each effect does and costs, the optima that several starts led to."""
+"""Tables of single verbs: what effects do and cost, the optima of several starts, what a computer has."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from dmoc.report import pairs
+
 if TYPE_CHECKING:
+    from dmoc.doctor import Findings
     from dmoc.effects.base import Effect
     from dmoc.influence import Influence
     from dmoc.solution import Solution
@@ -53,3 +56,23 @@ def optima_table(found: Sequence[Optimum], unit: str) -> RenderableType:
     for optimum in found:
         table.add_row(f"{optimum.objective:.8g}", ", ".join(optimum.starts))
     return Group(Text("Local optima found on the coarse mesh; the first is refined"), table, Text(""))
+
+
+def findings_table(found: Findings) -> RenderableType:
+    """What `dmoc doctor` found, one line a thing."""
+    works = [solver.full_name for solver in found.linear_solvers if solver.works]
+    fails = [solver.name for solver in found.linear_solvers if not solver.works]
+    milliseconds = [
+        f"order {run.order}, {run.steps} steps: {1e3 * run.build_s:.0f} ms to build, "
+        f"{1e3 * run.solve_s:.0f} ms to solve (medians of {run.runs})"
+        for run in found.timings
+    ]
+    return pairs(
+        [
+            ("versions", [f"{name} {version}" for name, version in found.versions.items()]),
+            ("system", f"{found.system}, {found.cores} cores that may be used"),
+            ("linear solvers", [f"{', '.join(works) or 'none'} in Ipopt", f"not here: {', '.join(fails)}"]),
+            ("C compiler", found.compiler or "none found; only code from dmoc export needs one"),
+            ("orbit_raise", milliseconds),
+        ]
+    )

@@ -143,7 +143,7 @@ def test_a_check_that_fails_exits_4(run):
     ("arguments", "words"),
     [
         (["solve", "free_flier"], ["'free_flier'", "did you mean free_flyer?"]),
-        (["solve", "qqq"], ["'qqq'", "bang_bang, drone_hop"]),
+        (["solve", "qqq"], ["'qqq'", "bang_bang, ", " drone_hop, "]),
         (["solve", "./nowhere.py"], ["./nowhere.py"]),
         (["solve", "free_flyer", "--set", "mas=3"], ["'mas'", "did you mean mass?", "duration, mass, limit"]),
         (["solve", "free_flyer", "--set", "mass"], ["'mass'", "name=value"]),
@@ -371,7 +371,10 @@ def test_help_and_list_do_not_load_the_libraries(arguments):
     assert ended.returncode == 0, ended.stderr
 
 
-@pytest.mark.parametrize("verb", ["list", "show", "solve", "simulate", "check", "plot"])
+@pytest.mark.parametrize(
+    "verb",
+    ["list", "show", "solve", "effects", "simulate", "check", "plot", "export", "study", "sweep", "doctor"],
+)
 def test_every_verb_has_an_example(run, verb):
     code, out, _ = run(verb, "--help")
     assert code == 0 and f"Example: dmoc {verb}" in out
@@ -380,3 +383,16 @@ def test_every_verb_has_an_example(run, verb):
 def test_without_arguments_it_helps(run):
     code, out, _ = run()
     assert code == 0 and "solve" in out and "Exit codes" in out
+
+
+def test_a_shell_completes_the_names_of_problems(tmp_path):
+    program = "import sys; sys.argv[0] = 'dmoc'; from dmoc.cli import main; main()"
+    asked = {"_DMOC_COMPLETE": "complete_bash", "COMP_WORDS": "dmoc solve free", "COMP_CWORD": "2"}
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=dict(os.environ) | asked,
+    )
+    assert ended.stdout.split() == ["free_flyer"], ended.stderr

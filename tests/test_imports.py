@@ -85,7 +85,8 @@ MAY_IMPORT = {
     "formulation": "mesh problem",
     "starts": "BASICS NLP MOTION climb coasting constraints",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
-    "report_tables": "EFFECTS influence solution starts",
+    "doctor": "library solver",
+    "report_tables": "EFFECTS doctor influence report solution starts",
     "study": "BASICS NLP MOTION ANSWER formulation long_run",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
     "plot_study": "files long_run plot plot_style study",
@@ -102,10 +103,10 @@ MAY_IMPORT = {
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli_parts": "plot",
+    "cli_parts": "__init__ library plot report report_tables solution starts verification",
     "study_command": "cli_parts formulation library plot_study report report_study study",
     "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts "
-    "report_tables sweep exporting cli_parts study_command",
+    "report_tables sweep exporting cli_parts doctor study_command",
 }
 
 # one of each pair imports the other inside a function, when it is asked for
