@@ -22,6 +22,7 @@ from dmoc.transcription import NLP, transcribe_onto, units_of
 
 COARSEST_NODES = 100
 FINER = 4
+MOST_COARSE = 400
 WIDEST_ROUNDING = 1e-2
 # How far beyond its limits a transfer on a coarse mesh is given up for good, and up to how many nodes it is
 # worth while to find out: the error of the coarse mesh is far below the one, the time small up to the other.
@@ -149,11 +150,15 @@ class Climb:
         return [*coarser, final]
 
     def least_steps(self, guess: Guess) -> int:
-        """Steps that keep h omega below 1 along a guess, omega the fastest rate of the linearised motion."""
+        """Steps that keep h omega below 1 along a guess, omega the fastest rate of the linearised motion.
+
+        At most 400: where a guess strays to where no path would go, its rates mean nothing.
+        """
         sample = guess.onto(uniform_mesh(min(100, len(guess.mesh) - 1)), 2, guess.hold)
         slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
         flow, _ = flow_matrices(self.dynamics, sample, self.problem.start_time, slopes)
-        return max(2, int(guess.duration * np.abs(np.linalg.eigvals(flow)).max()))
+        fastest = np.abs(np.linalg.eigvals(flow)).max() if np.isfinite(flow).all() else np.inf
+        return int(np.clip(guess.duration * fastest, 2, MOST_COARSE))
 
     def solution(self, **found: Any) -> Solution:
         """What the last level found; `found` are further fields of the Solution."""

@@ -119,13 +119,21 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
 
 
 def _idle(layout: Any, multipliers, values, lower, upper, weights: dict) -> float:
-    """Largest multiplier times the distance from its limit, as a density in time."""
+    """Largest multiplier times the distance from its limit, as a density in time.
+
+    Steps shorter than the mean count as the mean: what the barrier leaves at each limit is one
+    number for all, and over the shortest steps of a graded mesh it would look like a price.
+    """
     room = np.where(multipliers > 0, upper - values, values - lower)
     # a limit that is not there, or that is far away, must not have a multiplier at all
     product = np.abs(multipliers) * np.clip(room, 0.0, 1.0)
     product[lower == upper] = 0.0
     worst = [
-        (group.of(product) / weights.get(group.kind, np.ones(group.count))[:, None]).max(initial=0.0)
+        (group.of(product) / _not_tiny(weights.get(group.kind, np.ones(group.count)))).max(initial=0.0)
         for group in layout.groups
     ]
     return float(np.max(worst))
+
+
+def _not_tiny(weights: np.ndarray) -> np.ndarray:
+    return np.maximum(weights, np.mean(weights))[:, None]

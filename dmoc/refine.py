@@ -215,4 +215,6 @@ def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
     span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.force_limit() or 1.0))
     ends = control if path.hold else control[:: path.order // 2]
     change = (np.abs(np.diff(ends, axis=0)) / span).max(axis=1)
-    return np.flatnonzero(change > 0.2)
+    # a jump takes one step, or two with a node in its middle; what goes on beyond them is a steep slope
+    around = np.pad(change, 2)
+    return np.flatnonzero((change > 0.2) & (change > 3 * np.maximum(around[:-4], around[4:])))
