@@ -1,0 +1,62 @@
+"""What the README shows works: each section's commands and Python, in its own order, in an empty folder."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TEXT = (ROOT / "README.md").read_text()
+COMMAND = r"^ {4}\./scripts/run dmoc (?P<command>[^\n]*)$"
+BLOCK = r"(?P<before>[^\n]*)\n\n```python\n(?P<source>.*?)^```$"
+
+
+def parts(text):
+    """Commands and Python blocks in their order."""
+    return [match.groupdict() for match in re.finditer(f"{COMMAND}|{BLOCK}", text, re.MULTILINE | re.DOTALL)]
+
+
+SECTIONS = {text.splitlines()[0]: text for text in re.split(r"^## ", TEXT, flags=re.MULTILINE) if parts(text)}
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_what_the_readme_shows_works(section, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "readme"}
+    for part in parts(SECTIONS[section]):
+        if part["command"]:
+            run(part["command"], tmp_path)
+            continue
+        if saved := re.search(r"Save this as `(\S+)`", part["before"]):
+            (tmp_path / saved[1]).write_text(part["source"])
+        exec(part["source"], names)
+
+
+def run(line, folder):
+    command = [sys.executable, "-m", "dmoc.cli", *shlex.split(line, comments=True)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (ended.returncode, ended.stderr) == (0, ""), f"{line}\n{ended.stdout}{ended.stderr}"
+    for written in re.findall(r"--(?:out|plot) (\S+)", line):
+        assert (folder / written).stat().st_size > 1000, line
+
+
+def test_nothing_in_the_readme_is_left_out():
+    """Every fenced block and every line with a command is a part of a section."""
+    blocks = TEXT.count("```python")
+    commands = re.findall(r"^\s*\./scripts/run\s+dmoc", TEXT, re.MULTILINE)
+    assert TEXT.count("```") == 2 * blocks
+    assert sum(len(parts(text)) for text in SECTIONS.values()) == blocks + len(commands) > 10
+
+
+def test_every_file_the_readme_names_is_there():
+    named = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXT)
+    named += re.findall(r"\b((?:scripts|dmoc|tests|problems)/[\w/]+\.\w+)", TEXT)
+    assert named and not [name for name in named if not (ROOT / name).exists()]
+
+
+def test_pictures_of_the_gallery_are_of_moderate_size():
+    pictures = list((ROOT / "problems" / "gallery").glob("*.png"))
+    assert len(pictures) >= 10 and max(picture.stat().st_size for picture in pictures) < 250_000
