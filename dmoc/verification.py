@@ -209,16 +209,14 @@ def _energy_gap(case: Case) -> float | None:
 
 def _bounds(case: Case) -> Check:
     """The limit that is broken most against what it is allowed."""
-    found = excesses(case)
-    worst = max(found, key=lambda limit: limit.share)
+    worst = max(excesses(case), key=lambda limit: limit.share)
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
     shortest, longest = case.problem.duration_bounds
     below, above = case.path.duration - shortest, longest - case.path.duration
     if case.problem.free_duration and min(below, above) < 1e-6 * longest:
         bound = "shortest" if below < above else "longest"
         note += f"; the duration sits on its {bound} limit of {case.path.duration:g} s"
-    ok = all(limit.ok for limit in found)
-    return _check("bounds", worst.value, worst.allowed, worst.unit, note, also=ok)
+    return _check("bounds", worst.value, worst.allowed, worst.unit, note)
 
 
 def _optimality(case: Case) -> Check:
