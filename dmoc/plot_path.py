@@ -203,12 +203,13 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
         # a short side has room for few numbers
         axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
         # matplotlib measures this distance along the other two sides; make it the same for all three
-        axis.labelpad = 18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21
+        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, 7.0)
     for artist in (*axes.lines, *axes.collections):
         # the enlarged box reaches beyond the rectangle that would clip it; only its sides are laid out
         artist.set_clip_on(False)
         artist.set_in_layout(False)
-    axes.set_box_aspect(spans, zoom=1.07)
+    # a tall box would reach into the legend below
+    axes.set_box_aspect(spans, zoom=0.95 if spans[2] > 1.5 * spans[:2].max() else 1.07)
     axes.set_anchor("N")
     axes.view_init(elev=25, azim=-60)
 
