@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +18,8 @@ from dmoc.transcription import NLP, transcribe_onto, units_of
 
 # The least slack of a limit on the way to a duration that needs less: a tenth of the limit.
 LEAST = -0.9
+# How deep a chord between two nodes cuts into a zone that is leapt across, in radii; how many zones are tried.
+LEAP, MOST_ZONES = 0.1, 8
 # How many durations are tried, by what factor's logarithm each differs from the one before at most, and
 # how exactly the limits are met in the one found.
 MOST_DURATIONS, WIDEST, EXACT = 9, 1.0, 1e-3
@@ -66,6 +67,8 @@ def cause_of(problem: TransferProblem, guess: Guess) -> Cause:
     found = joint(case.problem, case.guess)
     if not found.feasible:
         return case.rows()
+    if case.jumps(found.path):
+        return case.zones() or case.rows()
     if found.slack[0] <= MET:
         return Cause(path=found.path)
     needs = []
@@ -192,17 +195,32 @@ class _Case:
         if miss.max() <= MET:
             return Cause(path=found.path)
         worst = [i for i in np.argsort(-miss)[:5] if miss[i] > 1e-3 * miss.max()]
-        names = [self.nlp.rows.name_of(i) for i in worst]
-        needs = list(self._zones(names))
-        return Cause(needs=tuple(needs), rows=() if needs else tuple(names))
+        names = tuple(self.nlp.rows.name_of(i) for i in worst)
+        blamed = {name.split("[")[0] for name in names}
+        return (self.zones() if any(name.startswith("keep_out_") for name in blamed) else None) or Cause(
+            rows=names
+        )
 
-    def _zones(self, names: list[str]) -> Iterator[str]:
-        for name in sorted({name.split("[")[0] for name in names if name.startswith("keep_out_")}):
+    def jumps(self, path: Guess) -> bool:
+        """Whether a path leaps across a zone between two nodes: with enough force it can."""
+        inside = np.linspace(0, 1, 9)[1:-1, None, None]
+        chords = (1 - inside) * path.position[:-1] + inside * path.position[1:]
+        chords = chords.reshape(-1, path.position.shape[1])
+        zones = [zone for zone in self.problem.constraints if isinstance(zone, KeepOut)]
+        return any((zone.excess(chords, chords) > LEAP * zone.radius).any() for zone in zones)
+
+    def zones(self) -> Cause | None:
+        """Each keep-out zone relaxed alone."""
+        needs, excess = [], 0.0
+        for name in [group.name for group in self.nlp.rows.groups if group.name.startswith("keep_out_")][
+            :MOST_ZONES
+        ]:
             part = self.zone(name)
-            if part is not None:
-                found = self.relaxed(part)(self.problem, self.guess)
-                if found.feasible and found.slack[0] < 1:
-                    yield part.words(float(found.slack[0]))
+            found = None if part is None else self.relaxed(part)(self.problem, self.guess)
+            if part is not None and found is not None and found.feasible and found.slack[0] < 1:
+                needs.append(part.words(float(found.slack[0])))
+                excess = max(excess, float(found.slack[0]))
+        return Cause(needs=tuple(needs), excess=excess) if needs else None
 
 
 def _force_words(actuator: Any, slack: float) -> str:
