@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dmoc import (
+    Actuator,
     BallForce,
     BoxForce,
     Condition,
@@ -21,6 +22,7 @@ from dmoc import (
     Moving,
     PointGravity,
     RotatingFrame,
+    Row,
     SpeedLimit,
     Spring,
     State,
@@ -577,6 +579,41 @@ def test_a_speed_above_the_limit_fails():
     report = verify(solution, replace(FAST, constraints=[SpeedLimit(1.28)]))
     assert not report["bounds"].ok
     assert report["bounds"].value == pytest.approx(0.02, rel=0.05)
+
+
+def test_a_coarse_mesh_does_not_excuse_speed():
+    """Ten steps, between which the velocity sways by more than the 3 % above the limit."""
+    solution = solve(FAST, steps=10)
+    fastest = np.linalg.norm(solution.velocity, axis=1).max()
+    report = verify(solution, replace(FAST, constraints=[SpeedLimit(0.97 * fastest)]))
+    assert not report["bounds"].ok
+
+
+@dataclass(frozen=True)
+class Wedge(Actuator):
+    """A user's actuator: no more force across than a share of that along."""
+
+    share: float
+
+    def rows(self, u):
+        return [Row("wedge", (u[1] / 2) ** 2 - (self.share * u[0] / 2) ** 2, -np.inf, 0.0)]
+
+
+def test_rows_of_a_users_actuator_count():
+    solution = solve(replace(FAST, actuator=Wedge(0.3)))
+    assert np.allclose(solution.force[:, 1], 0.2 * solution.force[:, 0], rtol=0, atol=1e-4)
+    assert verify(solution).ok
+    report = verify(solution, replace(FAST, actuator=Wedge(0.1)))
+    assert not report["bounds"].ok
+    assert "actuator wedge" in report["bounds"].note
+
+
+def test_burning_below_the_dry_mass_fails():
+    solution = solve(BURNING, order=4)
+    heavy = replace(BURNING, actuator=replace(BURNING.actuator, dry_mass=1.7))
+    report = verify(solution, heavy)
+    assert not report["bounds"].ok
+    assert "dry mass" in report["bounds"].note
 
 
 def test_a_ball_of_forces_is_a_limit_too():
