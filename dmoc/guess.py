@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 
 from dmoc.coasting import attractors_of, center_of, coast, end_estimates, lone_attractor, spiral_between
+from dmoc.constraints import KeepOut
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes
 from dmoc.problem import TransferProblem
 from dmoc.simulation import legendre_momenta
+
+# How near the centre of a keep-out zone a guess is pushed aside, and how far, in radii.
+CENTRAL, PUSH = 0.05, 0.3
 
 
 def starting_guess(
@@ -44,6 +48,7 @@ def starting_guess(
     if not np.isfinite(position).all():
         node = int(np.argmin(np.isfinite(position).all(axis=1)))
         raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
+    position = _past_centres(problem, position, fractions)
     for end, place in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
@@ -207,6 +212,33 @@ def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) ->
         offset = np.where(distance > 1e-9 * least, offset, sideways / (np.linalg.norm(sideways) or 1.0))
         length = np.linalg.norm(offset, axis=1, keepdims=True)
         path = center + offset * np.maximum(distance, least) / np.where(length > 0, length, 1.0)
+    return path
+
+
+def _past_centres(problem: TransferProblem, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """Push a guess aside where it runs through the centre of a keep-out zone.
+
+    There no side is nearer than the other, and every step of the optimiser keeps to the middle.
+    """
+    for zone in problem.constraints:
+        if not isinstance(zone, KeepOut) or problem.dimension == 1:
+            continue
+        offset = path - np.asarray(zone.center)
+        distance = np.linalg.norm(offset, axis=1)
+        node = int(np.clip(np.argmin(distance), 1, len(path) - 2))
+        along = path[node + 1] - path[node - 1]
+        along /= np.linalg.norm(along) or 1.0
+        aside = offset[node] - (offset[node] @ along) * along
+        if distance[node] > zone.radius or np.linalg.norm(aside) > CENTRAL * zone.radius:
+            continue
+        if np.linalg.norm(aside) <= 1e-6 * zone.radius:
+            # the axis that the path follows least, then the next one, are turned to stand across it
+            order = np.argsort(np.abs(along), kind="stable")
+            aside = np.zeros_like(along)
+            aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
+        near = np.maximum(0.0, 1 - (distance / (2 * zone.radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
+        push = PUSH * zone.radius * near / max(near[node], 1e-3)
+        path = path + push[:, None] * aside / np.linalg.norm(aside)
     return path
 
 

@@ -63,7 +63,7 @@ MAY_IMPORT = {
     # the way from a problem to a solution
     "spiral": "",
     "coasting": "EFFECTS boundary mechanics problem spiral",
-    "guess": "BASICS coasting mechanics mesh problem simulation",
+    "guess": "BASICS coasting constraints mechanics mesh problem simulation",
     "blocks": "BASICS assembly mechanics mesh problem",
     "transcription": "BASICS assembly blocks guess mechanics mesh problem",
     "ipopt": "BASICS mesh problem transcription",
