@@ -170,7 +170,8 @@ class Interrupt:
     """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate is worth it."""
 
     def __init__(self) -> None:
-        self.seen, self._previous = False, None
+        self.seen = False
+        self._previous: Any = None
 
     def __enter__(self) -> Interrupt:
         if threading.current_thread() is threading.main_thread():

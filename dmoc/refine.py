@@ -142,10 +142,10 @@ def estimate(
 def path_scales(path: Guess) -> tuple[float, float]:
     """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
     extent = float(np.linalg.norm(np.ptp(path.position, axis=0)))
-    ends = max(np.linalg.norm(path.start_velocity), np.linalg.norm(path.goal_velocity))
-    extent = extent or float(ends * path.duration) or 1.0
+    ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
+    extent = extent or ends * path.duration or 1.0
     length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
-    return extent, float(max(length / path.duration, ends)) or extent / path.duration
+    return extent, max(length / path.duration, ends) or extent / path.duration
 
 
 def local_errors(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
