@@ -134,20 +134,26 @@ def trapezoid(problem: TransferProblem, steps: int) -> Formulation:
     return draft.formulation(defects, cost * weights(steps, (0.5, 0.5)), s[:, [0, steps]], u, (0.0, 1.0))
 
 
-def rk4_shooting(problem: TransferProblem, steps: int) -> Formulation:
-    """Multiple shooting, a classical Runge-Kutta step each, force at its ends and middle: order 4 (Hager)."""
+def rk4_shooting(problem: TransferProblem, steps: int, hold: bool = False) -> Formulation:
+    """Multiple shooting, a classical Runge-Kutta step each, force at its ends and middle: order 4 (Hager).
+
+    With `hold` the force is constant over each step, as is often seen: order 2.
+    """
     draft = Draft(problem, steps)
     at, h, rates = np.linspace(0, 1, steps + 1), draft.h, draft.rates()
-    tau, before, u = ca.SX.sym("tau"), ca.SX.sym("s", 2 * draft.n), ca.SX.sym("u", draft.n, 3)
-    k1, c1 = rates(tau, before, u[:, 0])
-    k2, c2 = rates(tau + h / 2, before + h / 2 * k1, u[:, 1])
-    k3, c3 = rates(tau + h / 2, before + h / 2 * k2, u[:, 1])
-    k4, c4 = rates(tau + h, before + h * k3, u[:, 2])
+    tau, before, f = ca.SX.sym("tau"), ca.SX.sym("s", 2 * draft.n), ca.SX.sym("u", draft.n, 1 if hold else 3)
+    first, middle, last = (f, f, f) if hold else ca.horzsplit(f)
+    k1, c1 = rates(tau, before, first)
+    k2, c2 = rates(tau + h / 2, before + h / 2 * k1, middle)
+    k3, c3 = rates(tau + h / 2, before + h / 2 * k2, middle)
+    k4, c4 = rates(tau + h, before + h * k3, last)
     outputs = [before + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), h / 6 * (c1 + 2 * c2 + 2 * c3 + c4)]
-    step = ca.Function("step", [tau, before, ca.vec(u)], outputs)
-    s, u = draft.states(at), draft.forces(2 * steps + 1)
-    after, cost = step.map(steps)(at[None, :-1], s[:, :-1], ca.vertcat(u[:, :-1:2], u[:, 1::2], u[:, 2::2]))
-    return draft.formulation(s[:, 1:] - after, cost, s[:, [0, steps]], u, (0.0, 0.5, 1.0))
+    step = ca.Function("step", [tau, before, ca.vec(f)], outputs)
+    s, u = draft.states(at), draft.forces(steps if hold else 2 * steps + 1)
+    stages = u if hold else ca.vertcat(u[:, :-1:2], u[:, 1::2], u[:, 2::2])
+    after, cost = step.map(steps)(at[None, :-1], s[:, :-1], stages)
+    points = (0.5,) if hold else (0.0, 0.5, 1.0)
+    return draft.formulation(s[:, 1:] - after, cost, s[:, [0, steps]], u, points)
 
 
 def hermite_simpson(problem: TransferProblem, steps: int) -> Formulation:
@@ -235,6 +241,7 @@ METHODS = {
     "plain": plain,
     "trapezoid": trapezoid,
     "RK4 shooting": rk4_shooting,
+    "RK4 shooting, held": partial(rk4_shooting, hold=True),
     "Hermite-Simpson": hermite_simpson,
     "Radau 3": partial(radau, degree=3),
     "Radau 5": partial(radau, degree=5),

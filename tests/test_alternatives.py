@@ -17,7 +17,8 @@ from dmoc.library import load_problem
 from dmoc.study import work_precision
 
 METHODS = load_methods(Path(__file__).parent.parent / "scripts" / "alternatives.py")
-ORDERS = {"plain": 2, "trapezoid": 2, "RK4 shooting": 4, "Hermite-Simpson": 4, "Radau 3": 5, "Radau 5": 9}
+ORDERS = {"plain": 2, "trapezoid": 2, "RK4 shooting, held": 2, "RK4 shooting": 4, "Hermite-Simpson": 4}
+ORDERS |= {"Radau 3": 5, "Radau 5": 9}
 MESHES = {2: (100, 200, 400, 800), 4: (24, 48, 96, 192), 5: (8, 16, 32, 64), 9: (3, 4, 5, 6, 8)}
 
 

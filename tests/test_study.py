@@ -188,7 +188,7 @@ def test_study_prints_tables_and_writes_files(capfd, tmp_path):
         assert word in out
     assert picture.read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader(table.open()))
-    assert len(rows) == 2 * 2 + 2 * 6 and float(rows[0]["error"]) < 1e-2
+    assert len(rows) == 2 * 2 + 2 * 7 and float(rows[0]["error"]) < 1e-2
 
 
 def test_study_prints_one_json_object(capfd):

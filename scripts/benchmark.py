@@ -1,0 +1,241 @@
+"""How fast dmoc is, end to end (build and solve), against the methods of scripts/alternatives.py.
+
+    ./scripts/run python scripts/benchmark.py                 under three minutes
+    ./scripts/run python scripts/benchmark.py --json out.json --largest 100000
+
+Ratios are between medians of runs that take turns, so that whatever else the computer does falls on both
+alike. Iterations and evaluations stand beside the seconds: they do not depend on the computer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from alternatives import METHODS, radau
+from benchmark_report import (
+    console,
+    milliseconds,
+    show_equal_error,
+    show_pairs,
+    show_parts,
+    show_verdicts,
+    verdicts,
+)
+
+from dmoc import BallForce, PointGravity, State, TransferProblem, solve, verify
+from dmoc.guess import starting_guess
+from dmoc.ipopt import make_solver, path_of, run
+from dmoc.library import load_problem
+from dmoc.mesh import uniform_mesh
+from dmoc.study import Trial, time_to_reach, work_precision
+from dmoc.transcription import transcribe_onto, units_of
+
+OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
+TARGET = 1e-6
+ORDERS = {"order 2": 2, "order 4": 4, "order 6": 6, "order 8": 8}
+OTHERS = METHODS | {f"Radau {d}": partial(radau, degree=d) for d in (2, 3, 4, 5, 7)}
+ORDERS |= {"plain": 2, "trapezoid": 2, "RK4 shooting, held": 2, "RK4 shooting": 4, "Hermite-Simpson": 4}
+ORDERS |= {f"Radau {d}": 2 * d - 1 for d in (2, 3, 4, 5, 7)}
+# Steps of a first solve at each order, from whose error the number of steps for TARGET follows.
+PILOT = {2: 800, 3: 100, 4: 60, 5: 30, 6: 16, 7: 12, 8: 10, 9: 8, 13: 5}
+
+
+def kepler_transfer() -> TransferProblem:
+    """K1: from the circular orbit of radius 1 to that of 1.5 by 4 rad in 5 time units, least effort."""
+    speed = 1 / math.sqrt(1.5)
+    goal = State((1.5 * math.cos(4), 1.5 * math.sin(4)), (-speed * math.sin(4), speed * math.cos(4)))
+    return TransferProblem(1.0, State((1, 0), (0, 1)), goal, 5.0, effects=[PointGravity(1.0)])
+
+
+def smooth_problems() -> dict[str, TransferProblem]:
+    made = {name: load_problem(name).make() for name in ("orbit_raise", "rendezvous")}
+    return made | {"K1": kepler_transfer()}
+
+
+# --- the same scheme, written plainly ---------------------------------------------------------------------
+
+
+def against_plain(steps: int, repeats: int) -> dict[str, Any]:
+    """Coarse to fine with assembled derivatives against eq. (16) written down: the same discrete optimum."""
+    problem = load_problem("orbit_raise").make()
+    plain = {"plain": METHODS["plain"]}
+    ours, theirs = work_precision(problem, (2,), (steps,), repeats, plain, OPTIMA["orbit_raise"])
+    return {
+        "steps": steps,
+        "dmoc": _facts(ours),
+        "plain": _facts(theirs),
+        "ratio": theirs.seconds / ours.seconds,
+        "ratio in Ipopt": theirs.solve_s / ours.solve_s,
+    }
+
+
+def _facts(trial: Trial) -> dict[str, Any]:
+    names = ("build_s", "solve_s", "iterations", "calls", "error", "steps")
+    return {"seconds": trial.seconds} | {name: getattr(trial, name) for name in names}
+
+
+# --- another start or limit, without a rebuild ------------------------------------------------------------
+
+
+def resolve(name: str, change: Any, steps: int = 400, repeats: int = 7) -> dict[str, Any]:
+    """A problem solved again with another start or limit, against writing and solving it anew."""
+    problem = load_problem(name).make()
+    changed = change(problem)
+    known = solve(problem, steps=steps).raise_for_status().path
+    nlp = transcribe_onto(problem, known, units_of(problem, known))
+    solver = make_solver(nlp, warm=True)
+    times: dict[str, list[float]] = {"dmoc": [], "plain": []}
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        nlp.accepts(changed)
+        answer = run(solver, nlp, changed, known)
+        path_of(nlp, changed, answer)
+        times["dmoc"].append(time.perf_counter() - begun)
+        (theirs,) = work_precision(changed, (), (steps,), 1, {"plain": METHODS["plain"]}, 1.0)
+        times["plain"].append(theirs.seconds)
+    seconds = {who: median(each) for who, each in times.items()}
+    same = abs(nlp.objective(answer.objective) / theirs.objective - 1)
+    return {
+        "problem": name,
+        "status": answer.status,
+        "same optimum": same,
+        "dmoc": {"seconds": seconds["dmoc"], "iterations": answer.iterations},
+        "plain": {"seconds": seconds["plain"], "iterations": theirs.iterations},
+        "ratio": seconds["plain"] / seconds["dmoc"],
+    }
+
+
+def moved_start(problem: TransferProblem) -> TransferProblem:
+    """Start one hundredth further out and half a hundredth slower."""
+    position, velocity = problem.start.fixed()
+    return replace(problem, start=State(1.01 * position, 0.995 * velocity))
+
+
+def weaker(problem: TransferProblem) -> TransferProblem:
+    """A limit lower by three hundredths."""
+    return replace(problem, actuator=BallForce(0.97 * problem.actuator.force_limit()))
+
+
+# --- equal error ------------------------------------------------------------------------------------------
+
+
+def equal_error(name: str, problem: TransferProblem) -> dict[str, Any]:
+    """Seconds of every method to an error of TARGET in the objective, from meshes just coarser and finer."""
+    optimum, meshes = OPTIMA[name], {}
+    for method, order in ORDERS.items():
+        (trial,) = _some(problem, {method: [PILOT[order]]}, 1, optimum)
+        steps = PILOT[order] * (max(trial.error, 1e-14) / TARGET) ** (1 / order)
+        meshes[method] = [max(3, math.floor(0.8 * steps)), max(5, math.ceil(1.25 * steps))]
+    many = {method: counts for method, counts in meshes.items() if counts[-1] > 2000}
+    few = {method: counts for method, counts in meshes.items() if method not in many}
+    trials = _some(problem, few, 5, optimum) + _some(problem, many, 1, optimum)
+    times = {method: found for method, (found,) in time_to_reach(trials, (TARGET,)).items()}
+    own = {method: times[method] for method in ("order 2", "order 4", "order 6", "order 8")}
+    best = min(own, key=lambda method: own[method] or math.inf)
+    rows = {
+        method: {
+            "seconds": times[method],
+            "steps": meshes[method],
+            "ratio": None if times[method] is None else times[method] / times[best],
+            "solves": [_facts(trial) for trial in trials if trial.method == method],
+        }
+        for method in times
+    }
+    return {"problem": name, "target": TARGET, "best": best, "methods": rows}
+
+
+def _some(problem: TransferProblem, meshes: dict[str, list[int]], repeats: int, optimum: float) -> list[Trial]:
+    orders = [ORDERS[method] for method in meshes if method.startswith("order ")]
+    others = {method: OTHERS[method] for method in meshes if method in OTHERS}
+    return work_precision(problem, orders, meshes, repeats, others, optimum)
+
+
+# --- where the time goes ----------------------------------------------------------------------------------
+
+
+def import_seconds() -> float:
+    """Seconds until `dmoc.solve` is there, in a new process."""
+    code = "import time; t = time.perf_counter(); import dmoc; dmoc.solve; print(time.perf_counter() - t)"
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True) for _ in range(3)]
+    return median(float(done.stdout) for done in runs)
+
+
+def parts_of_a_solve(steps: int) -> dict[str, Any]:
+    """Seconds of guess, building, evaluating, linear algebra, the rest of Ipopt, and verification."""
+    problem = load_problem("orbit_raise").make()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "ipopt.txt"
+        options = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}
+        options["print_timing_statistics"] = "yes"
+        begun = time.perf_counter()
+        starting_guess(problem, uniform_mesh(steps), 2, False)
+        guessed = time.perf_counter()
+        found = solve(problem, steps=steps, options={f"ipopt.{key}": value for key, value in options.items()})
+        seconds = time.perf_counter() - guessed
+        statistics = file.read_text()
+    inside = {
+        part: sum(
+            float(line.split("wall:")[1].rstrip(" )"))
+            for line in statistics.splitlines()
+            if line.startswith(part)
+        )
+        for part in ("Function Evaluations", "PDSystemSolverTotal")
+    }
+    evaluating, algebra = inside.values()
+    guess = guessed - begun
+    return {
+        "steps": steps,
+        "guess": guess,
+        "build": found.build_s,
+        "evaluation": evaluating,
+        "linear algebra": algebra,
+        "rest of Ipopt": found.solve_s - evaluating - algebra,
+        "rest": seconds - guess - found.build_s - found.solve_s,
+        "solve in all": seconds,
+        "verification": verify(found).seconds,
+        "levels": [(level.steps, level.iterations) for level in found.ladder],
+    }
+
+
+def measure(largest: int) -> dict[str, Any]:
+    """Everything, shown as it comes."""
+    results: dict[str, Any] = {"import": import_seconds()}
+    console.print(f"import dmoc: {milliseconds(results['import'])} ms")
+    results["plain"] = [against_plain(400, 7), against_plain(25_600, 2)]
+    show_pairs("The same scheme: orbit_raise", [(f"{each['steps']} steps", each) for each in results["plain"]])
+    results["resolve"] = {"start": resolve("orbit_raise", moved_start), "limit": resolve("drone_hop", weaker)}
+    pairs = [(f"{each['problem']}, another {what}", each) for what, each in results["resolve"].items()]
+    show_pairs("Solved again, 400 steps", pairs)
+    results["equal error"] = [equal_error(name, problem) for name, problem in smooth_problems().items()]
+    for found in results["equal error"]:
+        show_equal_error(found)
+    results["parts"] = [parts_of_a_solve(n) for n in (50, 400, 3200, 25_600, 100_000) if n <= largest]
+    show_parts(results["parts"])
+    show_verdicts(verdicts(results))
+    return results
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures here")
+    parser.add_argument("--largest", type=int, default=25_600, help="most steps to take apart (100000: slow)")
+    given, begun = parser.parse_args(), time.perf_counter()
+    results = measure(given.largest)
+    console.print(f"\n{time.perf_counter() - begun:.0f} s")
+    if given.json is not None:
+        given.json.write_text(json.dumps(results, indent=2))
+
+
+if __name__ == "__main__":
+    main()
