@@ -1,7 +1,7 @@
 """Move a free body from rest to rest, least effort.
 
 Nothing acts on the body but its own force. The optimum is a cubic in time with the force linear in
-it: 6 m^2 d^2 / T^3 [N^2 s] for the distance d in the time T, 0.075 N^2 s at the defaults.
+it: 6 m^2 d^2 / T^3 [N^2 s] for the distance d in the time T, 0.0577 N^2 s at the defaults.
 """
 
 from dmoc import State, TransferProblem
