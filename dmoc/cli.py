@@ -187,13 +187,24 @@ def plot(
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
     problem: Source = None,
 ) -> None:
-    """Draw a saved solution."""
-    import dmoc
-    from dmoc import report
-    from dmoc.plot import save_figure
+    """Draw a saved solution, or the result of a sweep."""
+    from dmoc import report, sweep_data
 
     target = file.with_suffix(".png") if out is None else out
     writable(target, drawn=True)
+    if sweep_data.is_sweep(file):
+        from dmoc.plot_sweep import save_sweep
+
+        save_sweep(sweep_data.read(file), target)
+    else:
+        _draw_solution(file, target, problem)
+    report.console().print(f"wrote {target}")
+
+
+def _draw_solution(file: Path, target: Path, problem: str | None) -> None:
+    import dmoc
+    from dmoc.plot import save_figure
+
     try:
         solution = attached(file, problem)
     except ValueError as error:
@@ -202,7 +213,6 @@ def plot(
             raise
         warn(f"zones and limits are left out: {error}")
     save_figure(solution, target)
-    report.console().print(f"wrote {target}")
 
 
 @app.command("export", epilog="Example: dmoc export free_flyer planner --steps 40 --hold")

@@ -12,17 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dmoc.cli_parts import CHECK_FAILED, INTERRUPTED, NOT_SOLVED, SOLVED, Hold, Name, Order, Settings, Steps
+
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
     from dmoc.sweep_loop import Progress
 
-NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 3, 4, 130
-
 
 def sweep(
-    problem: Annotated[
-        str, typer.Argument(metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.")
-    ],
+    problem: Name,
     vary: Annotated[
         list[str],
         typer.Option(
@@ -37,14 +35,11 @@ def sweep(
     ] = None,
     method: Annotated[str, typer.Option(help="How a sample is spread: sobol or latin.")] = "sobol",
     seed: Annotated[int, typer.Option(help="Which sample.")] = 0,
-    order: Annotated[int | None, typer.Option(help="As for dmoc solve, like the next three.")] = None,
-    steps: Annotated[int | None, typer.Option()] = None,
-    tol: Annotated[float | None, typer.Option()] = None,
-    hold: Annotated[bool, typer.Option("--hold")] = False,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
-    ] = None,
+    order: Order = None,
+    steps: Steps = None,
+    tol: Annotated[float | None, typer.Option(help="Relative error to reach instead, at every point.")] = None,
+    hold: Hold = False,
+    settings: Settings = None,
     follow: Annotated[
         bool,
         typer.Option("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
@@ -120,7 +115,7 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
     )
     checks = "" if not broken else f" Checks fail at {broken} of them, see failed_check."
     console.print(Text(words + failed + checks, "yellow" if solved < success.size or broken else "green"))
-    return NOT_SOLVED if solved < success.size else CHECK_FAILED if broken else 0
+    return NOT_SOLVED if solved < success.size else CHECK_FAILED if broken else SOLVED
 
 
 @contextmanager

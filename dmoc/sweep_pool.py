@@ -19,7 +19,7 @@ from dmoc.sweep_worker import Task, solve_point
 
 # A sweep fills the cores with processes; threads of the linear algebra inside each would only get in the way.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-PATIENCE_S = 30
+PATIENCE_S = 10
 UNGUARDED = (
     "the worker processes end as soon as they start; in a script, call sweep() below "
     'if __name__ == "__main__":, since every worker reads the script too'
@@ -127,24 +127,46 @@ class SchedulerPool:
         except TimeoutError:
             self.client.close()
             raise ValueError(f"the scheduler at {address} has no workers; start some: dask worker") from None
-        self.executor = self.client.get_executor(pure=False, retries=0)
+        self._remote: dict[Future, Any] = {}
 
     def __enter__(self) -> SchedulerPool:
         return self
 
     def __exit__(self, *error: Any) -> None:
         if self.client.status == "running":
-            self.executor.shutdown(wait=False)
+            self.client.cancel(list(self._remote.values()))
         self.client.close()
 
     def submit(self, task: Task) -> Future:
+        """As `Client.get_executor().submit`, whose future never ends if a worker is lost with its result."""
+        found: Future = Future()
         if self.client.status != "running":
-            raise CancelledError
-        return self.executor.submit(solve_point, task)
+            found.set_exception(CancelledError())
+            return found
+        remote = self._remote[found] = self.client.submit(solve_point, task, pure=False, retries=0)
+
+        def hand_over(remote: Any) -> None:
+            try:
+                outcome = remote.result()
+            except self.deaths as error:
+                found.set_exception(error)
+            except BaseException as error:
+                lost = self.client.status != "running" or "Cancel" in type(error).__name__
+                found.set_exception(CancelledError() if lost else error)
+            else:
+                found.set_result(outcome)
+            self._remote.pop(found, None)
+
+        remote.add_done_callback(hand_over)
+        return found
 
     def width(self) -> int:
         """Two a thread, so that a worker has its next point at hand; workers may come and go."""
-        return 2 * max(1, sum(self.client.nthreads().values()))
+        try:
+            return 2 * max(1, sum(self.client.nthreads().values()))
+        except OSError:
+            # the scheduler does not answer: what is submitted next will say so
+            return 1
 
 
 @contextmanager

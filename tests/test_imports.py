@@ -91,7 +91,14 @@ MAY_IMPORT = {
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
     "plot_study": "files long_run plot plot_style study",
     "report_study": "report study",
-    "sweep": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
+    "sweep_worker": "BASICS mesh problem solution solver verification library",
+    "sweep_plan": "library",
+    "sweep_journal": "",
+    "sweep_pool": "sweep_worker",
+    "sweep_second": "sweep_plan",
+    "sweep_loop": "sweep_journal sweep_plan sweep_pool sweep_second sweep_worker",
+    "sweep_data": "files sweep_plan",
+    "sweeping": "__init__ library sweep_data sweep_journal sweep_loop sweep_plan sweep_pool sweep_worker",
     # what leaves the package
     "export_functions": "BASICS mechanics problem",
     "export_residual": "export_functions simulation",
@@ -102,11 +109,14 @@ MAY_IMPORT = {
     "plot_style": "BASICS mesh solution",
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
+    "plot_front": "plot_style sweep_data",
+    "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli_parts": "__init__ library plot report report_tables solution starts verification",
     "study_command": "cli_parts formulation library plot_study report report_study study",
+    "sweep_command": "cli_parts library report sweeping sweep_data sweep_journal sweep_loop sweep_plan",
     "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts "
-    "report_tables sweep exporting cli_parts doctor study_command",
+    "report_tables plot_sweep sweep_data sweep_command exporting cli_parts doctor study_command",
 }
 
 # one of each pair imports the other inside a function, when it is asked for
