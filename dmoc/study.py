@@ -147,8 +147,9 @@ def work_precision(
     ]
     value, doubt = best_known(problem) if reference is None else (float(reference), 1e-16)
     rounds = [[run() for _, run in runs] for _ in range(repeats)]
+    scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     return [
-        _trial(problem, labels, timed, value, doubt)
+        _trial(problem, labels, timed, (value, doubt), scales)
         for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
     ]
 
@@ -162,8 +163,10 @@ def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[
     return meshes
 
 
-def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[_Run], value: float, doubt: float) -> Trial:
-    name, order, steps, climbs = labels
+def _trial(
+    problem: TransferProblem, labels: tuple, timed: Sequence[_Run], known: tuple, scales: tuple
+) -> Trial:
+    (name, order, steps, climbs), (value, doubt) = labels, known
     last, solve_s = timed[-1], median(run.solve_s for run in timed)
     return Trial(
         name,
@@ -172,7 +175,7 @@ def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[_Run], value
         last.nodes,
         last.objective,
         max(abs(last.objective - value) / (abs(value) or 1.0), doubt),
-        _miss(problem, last.path),
+        _miss(problem, last.path, scales),
         last.iterations,
         last.calls,
         median(run.seconds for run in timed) - solve_s,
@@ -285,12 +288,11 @@ def _counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
     return found, sum(map(int, re.findall(r"^Number of .* evaluations +=\s*(\d+)$", text, re.MULTILINE)))
 
 
-def _miss(problem: TransferProblem, path: Guess | None) -> float:
-    """By how much the independent integrator misses the goal of a path, of its extent or speed [-]."""
+def _miss(problem: TransferProblem, path: Guess | None, scales: tuple[float, float]) -> float:
+    """By how much the independent integrator misses the goal of a path, of an extent [m] or speed [m/s]."""
     if path is None or not np.isfinite(path.control).all():
         return np.nan
     dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
-    extent, speed = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
     gaps = np.linalg.norm(position - path.position[-1]), np.linalg.norm(velocity - path.goal_velocity)
-    return float(max(gaps[0] / extent, gaps[1] / speed))
+    return float(max(gaps[0] / scales[0], gaps[1] / scales[1]))

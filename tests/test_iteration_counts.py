@@ -1,0 +1,88 @@
+"""Iterations do not creep up: on every problem file against recorded numbers, and warm against cold.
+
+Times depend on the computer; iterations do not. To record anew, after a change that is worth it:
+
+    ./scripts/run python tests/test_iteration_counts.py
+"""
+
+from functools import lru_cache
+
+import pytest
+
+from dmoc import solve
+from dmoc.climb import Climb
+from dmoc.guess import starting_guess
+from dmoc.library import catalogue, load_problem
+from dmoc.mesh import uniform_mesh
+
+# Each problem at its defaults, (order, steps): iterations on all meshes.
+RECORD = {
+    "bang_bang": {(2, 400): 17, (8, 32): 13},
+    "drone_hop": {(2, 400): 43, (8, 32): 29},
+    "earth_mars": {(2, 400): 70, (8, 32): 87},
+    "formation": {(2, 400): 48, (8, 32): 28},
+    "free_flyer": {(2, 400): 97, (8, 32): 64},
+    "goddard": {(2, 400): 49, (8, 32): 73},
+    "hovercraft": {(2, 400): 89, (8, 32): 94},
+    "leo_raise": {(2, 400): 121, (8, 32): 109},
+    "lunar_landing": {(2, 400): 22, (8, 32): 88},
+    "orbit_raise": {(2, 400): 17, (8, 32): 10},
+    "point_to_point": {(2, 400): 2, (8, 32): 1},
+    "rendezvous": {(2, 400): 2, (8, 32): 1},
+    "two_body_fuel": {(2, 400): 121, (8, 32): 99},
+}
+MESHES = ((2, 400), (8, 32))
+GROWTH = 1.2
+# Where a warm start takes more iterations on the last mesh than a cold one, and why.
+SLOWER_WARM = {
+    ("leo_raise", 2, 400): "least fuel: 54 iterations warm and 37 cold, as the rounding of the throttle "
+    "narrows on the way to the last mesh",
+}
+CASES = [(name, *at) for name, counts in RECORD.items() for at in counts]
+
+
+@lru_cache
+def warm(name, order, steps):
+    return solve(load_problem(name).make(), order=order, steps=steps).raise_for_status()
+
+
+def record():
+    """The table above, as it would be now."""
+    for name, _ in catalogue():
+        counts = {at: warm(name, *at).iterations for at in MESHES}
+        print(f'    "{name}": {counts},')
+
+
+@pytest.mark.parametrize("name", [name for name, _ in catalogue()])
+def test_every_problem_file_is_recorded(name):
+    assert name in RECORD, "run this file as a script and add the line it prints for the new problem"
+
+
+@pytest.mark.parametrize("name, order, steps", CASES)
+def test_iterations_have_not_grown(name, order, steps):
+    recorded, found = RECORD[name][order, steps], warm(name, order, steps)
+    # one more or less of a few is not a trend
+    most = max(GROWTH * recorded, recorded + 1)
+    levels = [(level.steps, level.iterations) for level in found.ladder]
+    assert found.iterations <= most, f"recorded {recorded}, now {found.iterations}: {levels}"
+
+
+@pytest.mark.parametrize(
+    "name, order, steps",
+    [
+        pytest.param(*case, marks=pytest.mark.xfail(strict=True, reason=SLOWER_WARM[case]))
+        if case in SLOWER_WARM
+        else case
+        for case in CASES
+    ],
+)
+def test_the_last_mesh_takes_no_more_iterations_warm_than_cold(name, order, steps):
+    problem = load_problem(name).make()
+    cold = Climb(problem)
+    solved = cold.solve_on(starting_guess(problem, uniform_mesh(steps), order, False))
+    last = warm(name, order, steps).ladder[-1]
+    assert not solved or last.iterations <= cold.levels[-1].iterations
+
+
+if __name__ == "__main__":
+    record()
