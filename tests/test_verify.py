@@ -365,6 +365,22 @@ def test_optimality_fails_on_a_path_that_is_feasible_only(flyer):
     ]
 
 
+def test_optimality_means_the_same_on_every_mesh():
+    """Costates 1e-4 off, smoothly, are 1e-4 off on 100 steps and on 1600."""
+    found = []
+    for steps in (100, 1600):
+        solution = solve(made("orbit_raise"), steps=steps)
+        known = solution.path.multipliers
+        values = known["smooth:row:dynamics"]
+        wave = 1e-4 * np.abs(values).max() * np.sin(9 * solution.path.fractions)[:, None]
+        bad = with_path(solution, multipliers=known | {"smooth:row:dynamics": values + wave})
+        found.append(stationarity(Case(bad)))
+    coarse, fine = found
+    assert coarse.force == pytest.approx(1e-4, rel=0.1)
+    assert fine.force == pytest.approx(coarse.force, rel=0.1)
+    assert fine.path == pytest.approx(coarse.path, rel=0.1)
+
+
 def test_optimality_fails_alone_on_a_false_objective(orbit, cart):
     for solution in (orbit, cart):
         bad = replace(solution, objective=solution.objective * 1.001)
@@ -408,6 +424,14 @@ def test_stability_fails_beyond_its_limit():
     assert not report["stability"].ok
     assert "h omega = 2.4" in report["stability"].note
     assert verify(solve(scene, steps=100))["stability"].ok
+
+
+def test_one_step_too_long_among_a_thousand_is_found():
+    scene = TransferProblem(1.0, State([1.0], [0]), State([0.0], [0.3]), 20.0, effects=[Quartic(1.5**2)])
+    mesh = np.concatenate([np.linspace(0, 0.45, 500), np.linspace(0.55, 1, 500)])
+    check = verify(solve(scene, mesh=mesh))["stability"]
+    assert not check.ok
+    assert "h omega = 3" in check.note
 
 
 @pytest.mark.parametrize("hold", [False, True])
