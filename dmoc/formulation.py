@@ -1,8 +1,11 @@
-"""A transfer as another method writes it down in CasADi, and what its answer means."""
+"""A transfer as another method writes it down in CasADi, and one solve of it."""
 
 from __future__ import annotations
 
+import re
 import runpy
+import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.ipopt import STATUS, make_solver
 from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
 
@@ -112,3 +116,46 @@ def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -
     mass = np.full(steps + 1, problem.mass)
     duration, velocities = problem.duration_bounds[0], (ends[n:, 0], ends[n:, 1])
     return Guess(uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities), forces.shape[1]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One solve, timed once. Its path has the goal that it believes to reach."""
+
+    path: Guess | None
+    nodes: int
+    objective: float
+    status: str
+    iterations: int
+    calls: int
+    seconds: float
+    solve_s: float
+
+
+def solve_other(problem: TransferProblem, name: str, method: Method, steps: int) -> Run:
+    """A solve by another method, with the options and tolerances of dmoc's own."""
+
+    def solve_with(options: dict[str, Any]) -> tuple[Formulation, dict, dict, list[float]]:
+        times = [time.perf_counter()]
+        made = formulated(name, method, problem, steps)
+        solver = make_solver(as_nlp(problem, made, steps), options)
+        (lbx, ubx), (lbg, ubg) = made.bounds, made.row_bounds
+        x0 = np.clip(made.guess, lbx, ubx)
+        times.append(time.perf_counter())
+        result = solver(x0=x0, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
+        return made, result, solver.stats(), [*times, time.perf_counter()]
+
+    (made, result, stats, (begun, ready, done)), calls = counted(solve_with)
+    path, nodes = path_of(problem, made, steps, result["x"])
+    objective, status = made.objective_unit * float(result["f"]), STATUS.get(stats["return_status"], "failed")
+    return Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
+
+
+def counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
+    """What a solve gives, and how many evaluations the summaries of Ipopt name, those of all meshes."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "ipopt.txt"
+        print_to = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}
+        found = solve_with({f"ipopt.{name}": value for name, value in print_to.items()})
+        text = file.read_text() if file.exists() else ""
+    return found, sum(map(int, re.findall(r"^Number of .* evaluations +=\s*(\d+)$", text, re.MULTILINE)))

@@ -16,26 +16,17 @@ from rich.text import Text
 from dmoc.files import whole_file
 from dmoc.study import TARGETS, Trial, time_to_reach
 
-COLUMNS = (
-    "method",
-    "steps",
-    "nodes",
-    "objective",
-    "error",
-    "goal missed",
-    "iterations",
-    "calls",
-    "build [ms]",
-    "solve [ms]",
-)
+FIGURES = ("error", "goal missed", "iterations", "calls", "build", "solve")
+# Terminals narrower than this get a table without nodes and calls.
+WIDE = 92
 
 
-def study_tables(trials: Sequence[Trial], unit: str) -> RenderableType:
+def study_tables(trials: Sequence[Trial], unit: str, width: int = WIDE) -> RenderableType:
     """Every solve, then the time to reach each accuracy."""
     solves = Text("Solves: relative errors, medians of the times", "bold")
     reach = Text("Milliseconds to a relative error of the objective (build and solve)", "bold")
     note = "interpolated between measured solves, never beyond them; - where not reached"
-    return Group(solves, _solves(trials, unit), Text(), reach, _reach(trials), Text(note, "dim"))
+    return Group(solves, _solves(trials, unit, width), Text(), reach, _reach(trials), Text(note, "dim"))
 
 
 def study_object(name: str, trials: Sequence[Trial]) -> dict[str, Any]:
@@ -59,19 +50,34 @@ def write_csv(trials: Sequence[Trial], path: Path) -> None:
         writer.writerows(asdict(trial) for trial in trials)
 
 
-def _solves(trials: Sequence[Trial], unit: str) -> Table:
-    table = _table([f"{name} [{unit}]" if name == "objective" and unit else name for name in COLUMNS])
-    for before, trial in zip((None, *trials), trials, strict=False):
-        new = before is None or before.method != trial.method
-        if trial.status == "solved":
-            figures = [f"{trial.objective:.8g}", f"{trial.error:.1e}", f"{trial.path_error:.1e}"]
-            counts = [str(trial.iterations), str(trial.calls)]
-            times = [f"{1e3 * seconds:.1f}" for seconds in (trial.build_s, trial.solve_s)]
-        else:
-            figures, counts, times = [trial.status, "-", "-"], ["-", "-"], ["-", "-"]
-        sizes = [str(trial.steps), str(trial.nodes)]
-        table.add_row(trial.method if new else "", *sizes, *figures, *counts, *times)
+def _solves(trials: Sequence[Trial], unit: str, width: int) -> Table:
+    rows = [_cells(trial) for trial in trials]
+    names = [name for name in rows[0] if width >= WIDE or name not in ("nodes", "calls")] if rows else []
+    units = {"objective": unit, "build": "ms", "solve": "ms"}
+    heads = [name.replace(" ", "\n") + (f"\n[{units[name]}]" if name in units else "") for name in names]
+    table = _table(heads)
+    before = ""
+    for row in rows:
+        shown = row | {"method": "" if row["method"] == before else row["method"]}
+        table.add_row(*[shown[name] for name in names])
+        before = row["method"]
     return table
+
+
+def _cells(trial: Trial) -> dict[str, str]:
+    cells = {"method": trial.method, "steps": str(trial.steps), "nodes": str(trial.nodes)}
+    if trial.status != "solved":
+        reason = trial.status.split(":")[0]
+        return cells | {"objective": reason} | dict.fromkeys(FIGURES, "-")
+    values = (
+        f"{trial.error:.1e}",
+        f"{trial.path_error:.1e}",
+        str(trial.iterations),
+        str(trial.calls),
+        f"{1e3 * trial.build_s:.1f}",
+        f"{1e3 * trial.solve_s:.1f}",
+    )
+    return cells | {"objective": f"{trial.objective:.8g}"} | dict(zip(FIGURES, values, strict=True))
 
 
 def _reach(trials: Sequence[Trial]) -> Table:
@@ -87,7 +93,7 @@ def _power(target: float) -> str:
 
 
 def _table(columns: Sequence[str]) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
     for i, column in enumerate(columns):
         table.add_column(column, justify="right" if i else "left", no_wrap=True)
     return table

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import re
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -17,9 +14,8 @@ import numpy as np
 
 from dmoc.climb import Climb
 from dmoc.formulation import Formulation as Formulation
-from dmoc.formulation import Method, as_nlp, formulated, path_of
+from dmoc.formulation import Method, Run, counted, solve_other
 from dmoc.guess import starting_guess
-from dmoc.ipopt import STATUS, make_solver
 from dmoc.lobatto import scheme
 from dmoc.long_run import drift as drift
 from dmoc.mechanics import Dynamics
@@ -94,11 +90,11 @@ def work_precision(
     against: Mapping[str, Method] | Sequence[tuple[str, Method]] = (),
     reference: float | None = None,
     cold: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> list[Trial]:
     """Solve a problem at several orders on several meshes, and measure error and time.
 
-    Every solve is repeated, with the repetitions of all solves taking turns, so that whatever else
-    the computer does falls on all of them alike.
+    The repetitions take turns, so that whatever else the computer does falls on all solves alike.
 
     Parameters
     ----------
@@ -117,6 +113,8 @@ def work_precision(
         The true objective; by default that of order 8 on a fine mesh.
     cold : bool
         Also solve each mesh at each order from the starting guess alone.
+    progress : callable
+        Called before every solve with what it is.
 
     Returns
     -------
@@ -131,7 +129,7 @@ def work_precision(
         raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
     meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
     others = dict(against)
-    runs: list[tuple[tuple, Callable[[], _Run]]] = [
+    runs: list[tuple[tuple, Callable[[], Run]]] = [
         (
             (name + ("" if climbs else ", cold"), order, count, climbs),
             partial(_own, problem, order, count, climbs),
@@ -141,17 +139,23 @@ def work_precision(
         for climbs in ((True, False) if cold else (True,))
     ]
     runs += [
-        ((name, None, count, False), partial(_other, problem, name, others[name], count))
+        ((name, None, count, False), partial(solve_other, problem, name, others[name], count))
         for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
         for count in counts
     ]
     value, doubt = best_known(problem) if reference is None else (float(reference), 1e-16)
-    rounds = [[run() for _, run in runs] for _ in range(repeats)]
+    rounds = [[_told(progress, labels, run) for labels, run in runs] for _ in range(repeats)]
     scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     return [
         _trial(problem, labels, timed, (value, doubt), scales)
         for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
     ]
+
+
+def _told(progress: Callable[[str], None] | None, labels: tuple, run: Callable[[], Run]) -> Run:
+    if progress is not None:
+        progress(f"{labels[0]}, {labels[2]} steps")
+    return run()
 
 
 def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
@@ -163,9 +167,7 @@ def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[
     return meshes
 
 
-def _trial(
-    problem: TransferProblem, labels: tuple, timed: Sequence[_Run], known: tuple, scales: tuple
-) -> Trial:
+def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: tuple) -> Trial:
     (name, order, steps, climbs), (value, doubt) = labels, known
     last, solve_s = timed[-1], median(run.solve_s for run in timed)
     return Trial(
@@ -208,7 +210,7 @@ def time_to_reach(trials: Sequence[Trial], targets: Sequence[float] = TARGETS) -
 
 
 def frontier(trials: Sequence[Trial]) -> list[Trial]:
-    """The solves that no faster solve equals in accuracy, fastest first."""
+    """The solves that no faster one equals in accuracy, fastest first."""
     best: list[Trial] = []
     for trial in sorted(trials, key=lambda trial: trial.seconds):
         if trial.status == "solved" and (not best or trial.error < best[-1].error):
@@ -226,21 +228,7 @@ def _when(points: list[Trial], target: float) -> float | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Run:
-    """One solve, timed once. Its path has the goal that it believes to reach."""
-
-    path: Guess | None
-    nodes: int
-    objective: float
-    status: str
-    iterations: int
-    calls: int
-    seconds: float
-    solve_s: float
-
-
-def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> _Run:
+def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> Run:
     """One of dmoc's own solves, by way of coarser meshes or not."""
 
     def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
@@ -251,41 +239,12 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> _Run
         return climb.solution(), time.perf_counter() - begun
 
     try:
-        (found, seconds), calls = _counted(solve_with)
+        (found, seconds), calls = counted(solve_with)
     except ValueError as error:
         # a mesh beyond the limit of stability is refused, and the next one may not be
-        return _Run(None, steps * order // 2 + 1, np.nan, f"refused: {error}", 0, 0, np.nan, np.nan)
+        return Run(None, steps * order // 2 + 1, np.nan, f"refused: {error}", 0, 0, np.nan, np.nan)
     facts = found.objective, found.status, found.iterations
-    return _Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
-
-
-def _other(problem: TransferProblem, name: str, method: Method, steps: int) -> _Run:
-    """A solve by another method, with the options and tolerances of dmoc's own."""
-
-    def solve_with(options: dict[str, Any]) -> tuple[Formulation, dict, dict, list[float]]:
-        times = [time.perf_counter()]
-        made = formulated(name, method, problem, steps)
-        solver = make_solver(as_nlp(problem, made, steps), options)
-        (lbx, ubx), (lbg, ubg) = made.bounds, made.row_bounds
-        x0 = np.clip(made.guess, lbx, ubx)
-        times.append(time.perf_counter())
-        result = solver(x0=x0, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
-        return made, result, solver.stats(), [*times, time.perf_counter()]
-
-    (made, result, stats, (begun, ready, done)), calls = _counted(solve_with)
-    path, nodes = path_of(problem, made, steps, result["x"])
-    objective, status = made.objective_unit * float(result["f"]), STATUS.get(stats["return_status"], "failed")
-    return _Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
-
-
-def _counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
-    """What a solve gives, and how many evaluations the summaries of Ipopt name, those of all meshes."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "ipopt.txt"
-        print_to = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}
-        found = solve_with({f"ipopt.{name}": value for name, value in print_to.items()})
-        text = file.read_text() if file.exists() else ""
-    return found, sum(map(int, re.findall(r"^Number of .* evaluations +=\s*(\d+)$", text, re.MULTILINE)))
+    return Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
 
 
 def _miss(problem: TransferProblem, path: Guess | None, scales: tuple[float, float]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
 from typing import Annotated
 
@@ -51,10 +51,12 @@ def study(
     writable(plot, drawn=True)
     writable(csv)
     chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
-    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+    live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
         case = load_problem(problem).make(**parse_settings(settings or ()))
         methods = {} if against is None else load_methods(against)
-        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold)
+        told = live.update if live else None
+        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold, told)
     if plot is not None:
         save_study(trials, plot, f"{case.name.replace('_', ' ')}: what accuracy costs in time")
     if csv is not None:
@@ -63,7 +65,8 @@ def study(
         print(report.as_json(report_study.study_object(case.name, trials)))
         return
     console = report.console()
-    console.print(report_study.study_tables(trials, case.objective.unit_with(case.actuator)))
+    unit = case.objective.unit_with(case.actuator)
+    console.print(report_study.study_tables(trials, unit, console.width))
     for path in filter(None, (plot, csv)):
         console.print(f"wrote {path}")
 
