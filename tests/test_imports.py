@@ -82,7 +82,7 @@ MAY_IMPORT = {
     "verification": "BASICS NLP MOTION solution case limits optimality",
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
-    "formulation": "mesh problem",
+    "formulation": "ipopt mesh problem",
     "starts": "BASICS NLP MOTION climb coasting constraints",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
     "doctor": "library solver",
@@ -90,7 +90,7 @@ MAY_IMPORT = {
     "study": "BASICS NLP MOTION ANSWER formulation long_run",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
     "plot_study": "files long_run plot plot_style study",
-    "report_study": "report study",
+    "report_study": "files study",
     "sweep_worker": "BASICS mesh problem solution solver verification library",
     "sweep_plan": "library",
     "sweep_journal": "",
