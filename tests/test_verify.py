@@ -372,7 +372,7 @@ def test_optimality_means_the_same_on_every_mesh():
         solution = solve(made("orbit_raise"), steps=steps)
         known = solution.path.multipliers
         values = known["smooth:row:dynamics"]
-        wave = 1e-4 * np.abs(values).max() * np.sin(9 * solution.path.fractions)[:, None]
+        wave = 1e-4 * np.abs(values).max() * np.sin(np.pi * solution.path.fractions)[:, None] ** 4
         bad = with_path(solution, multipliers=known | {"smooth:row:dynamics": values + wave})
         found.append(stationarity(Case(bad)))
     coarse, fine = found
