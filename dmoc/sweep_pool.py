@@ -6,6 +6,7 @@ points to have under way) and `deaths` (what a future raises whose worker ended 
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -118,6 +119,10 @@ class SchedulerPool:
         except ImportError:
             raise ValueError("--scheduler needs dask.distributed: pip install 'dmoc[sweep]'") from None
         self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
+        # what it logs, with tracebacks, is raised here in one line
+        self._log = logging.getLogger("distributed.client")
+        self._loudness = self._log.level
+        self._log.setLevel(logging.CRITICAL)
         try:
             self.client = Client(address, timeout=PATIENCE_S, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -136,6 +141,7 @@ class SchedulerPool:
         if self.client.status == "running":
             self.client.cancel(list(self._remote.values()))
         self.client.close()
+        self._log.setLevel(self._loudness)
 
     def submit(self, task: Task) -> Future:
         """As `Client.get_executor().submit`, whose future never ends if a worker is lost with its result."""
