@@ -98,9 +98,9 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
     return Report(checks, time.perf_counter() - begun)
 
 
-def _check(name: str, value: float, limit: float, unit: str, note: str, also: bool = True) -> Check:
+def _check(name: str, value: float, limit: float, unit: str, note: str) -> Check:
     """A verdict that a value which is not a number never passes."""
-    return Check(name, float(value), float(limit), unit, bool(value <= limit and also), note)
+    return Check(name, float(value), float(limit), unit, bool(value <= limit), note)
 
 
 def _residual(case: Case) -> Check:
@@ -185,8 +185,9 @@ def _ledger(case: Case) -> Check:
         note = f"energy to {energy:.1e} of {accuracy:g}"
     if case.mass.min() < case.mass.max():
         note += f", mass to {mass:.1e}"
-    held = energy is None or bool(energy <= accuracy)
-    return _check("ledger", value, exact, "of the impulse", note, also=held)
+    if energy is not None and not energy <= accuracy:
+        return _check("ledger", energy, accuracy, "of the energy", note)
+    return _check("ledger", value, exact, "of the impulse", note)
 
 
 def _energy_gap(case: Case) -> float | None:
