@@ -73,7 +73,9 @@ class Climb:
         if first.multipliers:
             return self.solve_on(first) or self._explained(first, None)
         stages = _stages(self._meshes(first), self.problem.actuator.smoothing)
-        known, solved = starting_guess(self.problem, stages[0][0], first.order, first.hold, given), False
+        known, solved = first, False
+        if len(stages[0][0]) != len(first.mesh):
+            known = starting_guess(self.problem, stages[0][0], first.order, first.hold, given)
         for mesh, rounding in stages:
             start = known.onto(mesh, first.order, first.hold)
             solved = self.solve_on(start, rounding)

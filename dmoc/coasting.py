@@ -43,15 +43,26 @@ def coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: 
     n, still = problem.dimension, np.zeros(problem.dimension)
     centers = [center_of(attractor, n) for attractor in attractors_of(problem)]
 
+    # through CasADi's buffers, without copies: the arrays they point to live as long as this call
+    acceleration = dynamics.acceleration
+    arguments = np.zeros(1), np.zeros(n), np.zeros(n), np.array([problem.mass]), still
+    pull = np.zeros(n)
+    buffer, evaluate = acceleration.buffer()
+    for i, argument in enumerate(arguments):
+        buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type]
+    buffer.set_res(0, memoryview(pull))  # type: ignore[arg-type]
+
     def rate(t: float, state: np.ndarray) -> np.ndarray:
-        push = dynamics.acceleration(problem.start_time + t, state[:n], state[n:], problem.mass, still)
-        return np.concatenate([state[n:], np.array(push).ravel()])
+        arguments[0][0], arguments[1][:], arguments[2][:] = problem.start_time + t, state[:n], state[n:]
+        evaluate()
+        return np.concatenate([state[n:], pull])
 
     def fell_in(t: float, state: np.ndarray) -> float:
         return min((_distance(state[:n], at) - 0.02 * _distance(q, at) for at in centers), default=1.0)
 
     fell_in.terminal = True  # type: ignore[attr-defined]
-    settings = {"rtol": 1e-6, "atol": 1e-9, "dense_output": True, "events": fell_in}
+    sizes = [np.abs(q).max() or 1.0, np.abs(v).max() or 1.0]
+    settings = {"rtol": 1e-6, "atol": 1e-9 * np.repeat(sizes, n), "dense_output": True, "events": fell_in}
     return solve_ivp(rate, (start, end), np.concatenate([q, v]), **settings)
 
 
