@@ -8,6 +8,7 @@ import numpy as np
 
 from dmoc.plot_style import PALE, PUSH, readable
 from dmoc.sweep_data import result
+from dmoc.sweep_plan import ordered
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
@@ -32,7 +33,7 @@ def draw_front(axes: Any, data: Dataset, names: tuple[str, str]) -> None:
     scales = [readable(column.values, unit_of(column)) for column in pair]
     x, y = (column.values[known] / size for column, (size, _) in zip(pair, scales, strict=True))
     best = pareto(x, y)
-    other = next((name for name in data.coords if name != "duration" and data[name].dtype.kind in "if"), None)
+    other = next((name for name in data.coords if name != "duration" and ordered(data[name].values)), None)
     if other is None:
         axes.plot(x, y, "o", color=PALE, markersize=5, alpha=0.6, label="solved")
     else:
@@ -46,7 +47,7 @@ def draw_front(axes: Any, data: Dataset, names: tuple[str, str]) -> None:
     axes.set_xlabel(f"duration [{pretty(scales[0][1])}]")
     axes.set_ylabel(f"{names[1]} [{pretty(scales[1][1])}]")
     axes.set_title(f"Time against {names[1]}")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12))
 
 
 def pareto(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -75,11 +76,20 @@ def is_front_itself(data: Dataset, names: tuple[str, str]) -> bool:
 def coordinate(data: Dataset, name: Any) -> tuple[np.ndarray, str]:
     """Where the values of a parameter stand on an axis, and what is written there."""
     values, unit = data[name].values, unit_of(data[name])
-    if values.dtype.kind not in "if":
-        return np.arange(len(values)), str(name)
+    if not ordered(values):
+        return np.arange(float(len(values))), str(name)
     size, shown = readable(values, unit)
     label = str(name).replace("_", " ")
     return values / size, f"{label} [{pretty(shown)}]" if shown not in ("", "1") else label
+
+
+def along(axis: Any, data: Dataset, name: Any) -> np.ndarray:
+    """Write on an axis what stands along it; where the values of the parameter stand."""
+    places, label = coordinate(data, name)
+    axis.set_label_text(label)
+    if not ordered(data[name].values):
+        axis.set_ticks(places, [str(value) for value in data[name].values])
+    return places
 
 
 def wide(values: np.ndarray) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.files import whole_file
 from dmoc.plot_front import (
     FRONT,
-    coordinate,
+    along,
     draw_front,
     front_axes,
     is_front_itself,
@@ -61,9 +61,8 @@ def figure(data: Dataset) -> Figure:
     with matplotlib.rc_context(SETTINGS):
         page = Figure(figsize=(9.0, 6.2) if alone else (13.33, 6.2), layout="constrained")
         panels = page.subplots(1, 1 if alone else 2, squeeze=False)[0]
-        axes = [name for name in data.coords if data[name].dtype.kind in "ifb"]
         if "sample" in objective.dims or "sample_" in objective.dims:
-            _draw_cloud(panels[0], data, axes)
+            _draw_cloud(panels[0], data, list(data.coords))
         elif objective.ndim == 1:
             _draw_curve(panels[0], data, front is not None and alone)
         else:
@@ -79,7 +78,7 @@ def figure(data: Dataset) -> Figure:
 def _draw_curve(axes: Any, data: Dataset, front: bool) -> None:
     """The objective over the only parameter; what failed is marked on the axis."""
     objective, solved = result(data, "objective"), result(data, "success").values
-    place, label = coordinate(data, objective.dims[0])
+    place = along(axes.xaxis, data, objective.dims[0])
     size, unit = readable(objective.values, unit_of(objective))
     values = objective.values / size
     doubtful = solved & ~result(data, "checks_hold").values
@@ -111,7 +110,6 @@ def _draw_curve(axes: Any, data: Dataset, front: bool) -> None:
         axes.plot(place[best], values[best], **FRONT)
     if wide(values):
         axes.set_yscale("log")
-    axes.set_xlabel(label)
     axes.set_ylabel(f"{_kind(objective)} [{pretty(unit)}]")
     axes.set_title(_title(objective))
     if front or doubtful.any() or not solved.all():
@@ -127,7 +125,7 @@ def _draw_map(axes: Any, data: Dataset) -> None:
     others = objective.dims[2:]
     best = (objective.min(others) if sense > 0 else objective.max(others)) if others else objective
     held = result(data, "checks_hold").any(others).values if others else result(data, "checks_hold").values
-    (x, x_label), (y, y_label) = coordinate(data, across), coordinate(data, up)
+    x, y = along(axes.xaxis, data, across), along(axes.yaxis, data, up)
     size, unit = readable(best.values, unit_of(objective))
     values, solved = best.values.T / size, np.isfinite(best.values.T)
     cells = axes.pcolormesh(_edges(x), _edges(y), values, norm=_norm(values), cmap="viridis")
@@ -142,7 +140,6 @@ def _draw_map(axes: Any, data: Dataset) -> None:
         axes.plot(x[column], y[row], "*", color=FORBIDDEN, markersize=15, markeredgecolor="white", label="best")
         axes.figure.colorbar(cells, ax=axes, label=f"{_kind(objective)} [{pretty(unit)}]")
     axes.grid(False)
-    axes.set(xlabel=x_label, ylabel=y_label)
     over = f", the best over {' and '.join(map(str, others))}" if others else ""
     axes.set_title(_title(objective) + over)
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3)
@@ -151,21 +148,20 @@ def _draw_map(axes: Any, data: Dataset) -> None:
 def _draw_cloud(axes: Any, data: Dataset, names: list) -> None:
     """The points of a sample over the first two parameters, or the objective over the only one."""
     objective, solved = result(data, "objective"), result(data, "success").values
-    place, label = coordinate(data, names[0])
+    place = along(axes.xaxis, data, names[0])
     size, unit = readable(objective.values, unit_of(objective))
     values, words = objective.values / size, f"{_kind(objective)} [{pretty(unit)}]"
     if len(names) == 1:
         axes.plot(place, values, "o", color=PATH, markersize=4)
-        axes.set(xlabel=label, ylabel=words)
+        axes.set_ylabel(words)
         if wide(values):
             axes.set_yscale("log")
     else:
-        height, up = coordinate(data, names[1])
+        height = along(axes.yaxis, data, names[1])
         style = {"c": values[solved], "norm": _norm(values), "cmap": "viridis", "s": 45}
         dots = axes.scatter(place[solved], height[solved], **style)
         axes.plot(place[~solved], height[~solved], "x", color=WARNING, label="not solved")
         axes.figure.colorbar(dots, ax=axes, label=words)
-        axes.set(xlabel=label, ylabel=up)
         if not solved.all():
             axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12))
     axes.set_title(_title(objective))
@@ -217,7 +213,7 @@ def _title(objective: DataArray) -> str:
 
 def _headline(data: Dataset) -> str:
     fixed = ", ".join(f"{name} {value}" for name, value in json.loads(data.attrs["settings"]).items())
-    varied = " and ".join(str(name).replace("_", " ") for name in data.coords)
+    varied = ", ".join(str(name).replace("_", " ") for name in data.coords)
     name = str(data.attrs["problem"]).replace("_", " ")
     return f"{name} over {varied}" + (f" ({fixed})" if fixed else "")
 

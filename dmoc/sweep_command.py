@@ -85,8 +85,9 @@ def sweep(
                 progress=progress,
             )
         except KeyboardInterrupt:
-            words = f"{tries['done']} of {tries['all']} points are kept in {journal_of(out)}"
-            print(f"{words}; give the same command again to go on", file=sys.stderr)
+            if (journal := journal_of(out)).exists():
+                words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
+                print(f"{words}; give the same command again to go on", file=sys.stderr)
             raise typer.Exit(INTERRUPTED) from None
     raise typer.Exit(_show(data, out, time.perf_counter() - begun, tries["done"] - tries["before"], quiet))
 

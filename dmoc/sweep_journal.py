@@ -62,6 +62,9 @@ class Journal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if not self.records and self.path.exists():
+            # nothing to go on from, so nothing to be refused for later
+            self.path.unlink()
         os.close(self._file)
 
     def append(self, wave: int, point: int, record: dict[str, Any], path: str | None) -> None:

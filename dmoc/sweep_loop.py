@@ -44,6 +44,7 @@ class Sweep:
     progress: Progress | None = None
     best: dict[int, tuple[int, dict[str, Any]]] = field(default_factory=dict)
     looks: Counter[int] = field(default_factory=Counter)
+    tries: int = 0
     unsolved: int = 0
 
     def run(self, follow: bool) -> list[dict[str, Any]]:
@@ -75,7 +76,7 @@ class Sweep:
             while ready and not suspects and len(running) < self.pool.width():
                 self._begin(wave, ready.popleft(), parents, running)
             if self.progress is not None:
-                self.progress(self.looks.total(), self.looks.total() + left, self.unsolved)
+                self.progress(self.tries, self.tries + left, self.unsolved)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 point, outcome = running.pop(future), self._outcome(future)
                 if outcome is None and not alone:
@@ -124,6 +125,7 @@ class Sweep:
         """Let a record count if it is the first of its point, or better."""
         record = self.journal.records[wave, point]
         self.looks[point] += 1
+        self.tries += 1
         known = self.best.get(point)
         if known is None or better(record, known[1]):
             was = 0 if known is None else not known[1].get("success")

@@ -59,16 +59,17 @@ class Plan:
         }
 
     def neighbours(self, point: int) -> list[list[int]]:
-        """The points next to a point: along each dimension of the grid, or the nearest in the sample."""
+        """The points next to a point: along each dimension of numbers, or the nearest in the sample."""
         if self.sampled:
             far = np.sum((self._cube - self._cube[point]) ** 2, axis=1)
             nearest = np.argsort(far, kind="stable")
             return [[int(other) for other in nearest if other != point][: 2 * len(self.values)]]
         stride, found = self.size, []
-        for length in self.shape:
+        for length, values in zip(self.shape, self.values, strict=True):
             stride //= length
             place = point // stride % length
-            found.append([point + step * stride for step in (-1, 1) if 0 <= place + step < length])
+            if ordered(values):
+                found.append([point + step * stride for step in (-1, 1) if 0 <= place + step < length])
         return found
 
     @cached_property
@@ -79,11 +80,11 @@ class Plan:
 
     def before(self, point: int) -> int | None:
         """The point that a point starts from with `follow`; None where a run begins."""
-        return point - 1 if point % self.shape[-1] % RUN else None
+        return point - 1 if ordered(self.values[-1]) and point % self.shape[-1] % RUN else None
 
     def joined(self, point: int) -> list[int]:
         """The neighbour along the last dimension that belongs to another run."""
-        if self.sampled:
+        if self.sampled or not ordered(self.values[-1]):
             return []
         return [other for other in self.neighbours(point)[-1] if max(other, point) % self.shape[-1] % RUN == 0]
 
@@ -116,6 +117,11 @@ def make_plan(
     if plan.size > MOST_POINTS:
         raise ValueError(f"the grid has {plan.size} points; at most {MOST_POINTS} can be swept")
     return plan
+
+
+def ordered(values: np.ndarray) -> bool:
+    """Whether values are numbers, so that next to each other means something."""
+    return values.dtype.kind in "if"
 
 
 def parse_vary(texts: Iterable[str]) -> dict[str, str]:

@@ -109,7 +109,7 @@ MAY_IMPORT = {
     "plot_style": "BASICS mesh solution",
     "plot_path": "BASICS EFFECTS PARTS solution plot_style",
     "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
-    "plot_front": "plot_style sweep_data",
+    "plot_front": "plot_style sweep_data sweep_plan",
     "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli_parts": "__init__ library plot report report_tables solution starts verification",

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from sweeps import Here, same, write_push
+from sweeps import Here, found, same, write_push
 
 import dmoc
 from dmoc import sweeping
@@ -91,7 +91,8 @@ def test_bad_input_is_one_line_and_exit_2(push, here, capfd):
 
 def test_a_journal_of_another_sweep_is_refused_by_name(push, here):
     begun = {"vary": {"mass": "1:2:3"}, "out": "out.nc", "steps": 8}
-    here.function = lambda task: 1 / 0
+    here.width = lambda: 1
+    here.function = lambda task: (found(1), "") if task.values["mass"] < 2 else 1 / 0
     with pytest.raises(ZeroDivisionError):
         dmoc.sweep(push, **begun)
     kept = journal_of("out.nc").read_bytes()
@@ -109,8 +110,12 @@ def test_a_journal_of_another_sweep_is_refused_by_name(push, here):
     with pytest.raises(ValueError, match="the problem file has changed"):
         dmoc.sweep(push, **begun)
     assert journal_of("out.nc").read_bytes() == kept
+    here.function = lambda task: 1 / 0
+    with pytest.raises(ZeroDivisionError):
+        dmoc.sweep(push, **begun, restart=True)
+    assert not journal_of("out.nc").exists(), "with nothing in it, it is only in the way"
     here.function = solve_point
-    assert result(dmoc.sweep(push, **begun, restart=True), "success").all()
+    assert result(dmoc.sweep(push, **begun), "success").all()
 
 
 def test_the_file_has_what_was_swept_as_dimensions_and_failures_as_data(push, here):
