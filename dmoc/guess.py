@@ -45,6 +45,8 @@ def starting_guess(
     else:
         position = _given_path(problem, given, duration, fractions)
         ends = _end_states(problem, duration)[1::2]
+        # a smooth path around an attractor is worth its forces, and through them its multipliers
+        spiral = callable(given) and lone_attractor(problem) is not None
     if not np.isfinite(position).all():
         node = int(np.argmin(np.isfinite(position).all(axis=1)))
         raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
