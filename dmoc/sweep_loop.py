@@ -75,8 +75,7 @@ class Sweep:
                 self._begin(wave, suspects[0], parents, running)
             while ready and not suspects and len(running) < self.pool.width():
                 self._begin(wave, ready.popleft(), parents, running)
-            if self.progress is not None:
-                self.progress(self.tries, self.tries + left, self.unsolved)
+            self._tell(left)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 point, outcome = running.pop(future), self._outcome(future)
                 if outcome is None and not alone:
@@ -90,6 +89,11 @@ class Sweep:
                 self._settle(wave, point)
                 ready.extend(children.pop(point, ()))
                 left -= 1
+        self._tell(left)
+
+    def _tell(self, left: int) -> None:
+        if self.progress is not None:
+            self.progress(self.tries, self.tries + left, self.unsolved)
 
     def _sorted_out(self, wave: int, parents: Mapping[int, int | None]) -> tuple[deque, dict[int, list[int]]]:
         """The points that can be begun, and those that wait for a parent; the journal may have some already."""

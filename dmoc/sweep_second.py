@@ -3,8 +3,9 @@
 The rule, as it was measured to pay: a point is first solved by itself. One that failed, or that is
 worse than its neighbours on every side along a dimension, is tried again from the best of them; the
 better answer counts. Where something became better, its own neighbours are tried from it, until
-nothing does. A start from a neighbour takes a third of the time of a cold one, but keeps to the
-neighbour's branch of local optima; so the first look is not from neighbours unless asked for.
+nothing does. A start from a neighbour takes a half to a quarter of the time of a cold one, but keeps
+to the neighbour's branch of local optima, which was seen to be 90 times worse along whole runs; so
+the first look is not from neighbours unless asked for.
 """
 
 from __future__ import annotations

@@ -43,8 +43,9 @@ def sweep(
 ) -> Dataset:
     """Solve and verify a problem at many values of its parameters.
 
-    Every point is solved in a worker process, from the problem's own guess. One that fails is tried
-    again from the answer of a solved neighbour, and again when another neighbour is solved later.
+    Every point is solved in a worker process, from the problem's own guess. One that failed, or that
+    is worse than its neighbours on every side along a dimension, is tried again from the best of
+    them, and so are the neighbours of what became better; the better answer counts.
 
     Each finished point goes into a journal beside `out`. A sweep that was interrupted or killed goes
     on where it was when it is started again, and ends with the same numbers; the journal goes when
@@ -70,7 +71,7 @@ def sweep(
         As for `solve`.
     follow : bool
         Start every point from the answer of the one before along the last dimension, in runs of
-        eight: faster, but on the branch of local optima that the first point of the run is on.
+        eight: up to twice as fast, but on the branch of local optima that the run begins with.
     workers : int
         Processes; as many as there are cores if not given.
     scheduler : str

@@ -234,7 +234,7 @@ def test_a_killed_sweep_goes_on_where_it_was_and_ends_the_same(push):
     kept, before = lines(), len(made(push))
     with open(journal_of("out.nc"), "ab") as journal:
         journal.write(b'{"wave": 0, "point": 5, "rec')
-    arguments = {"vary": {"mass": "1:6:6"}, "steps": 8, "settings": {"nap": 0.15}, "workers": 2}
+    arguments = {"vary": {"mass": "1:6:6"}, "steps": 8, "settings": {"nap": 0.15}, "workers": 1}
     tries = []
     data = dmoc.sweep(push, out="out.nc", **arguments, progress=lambda *now: tries.append(now))
     assert tries[0][0] >= kept >= 2 and not journal_of("out.nc").exists()
@@ -331,3 +331,12 @@ def test_killed_again_and_again_it_ends_the_same(push):
     settings = {"nap": 0.15}
     whole = dmoc.sweep(push, {"mass": "1:6:6"}, "whole.nc", steps=8, settings=settings)
     assert same(read("out.nc"), whole)
+
+
+@pytest.mark.slow
+def test_a_script_that_forgot_its_guard_is_told_so(push):
+    script = push.with_name("script.py")
+    script.write_text('import dmoc\ndmoc.sweep("push.py", {"mass": "1:3:3"}, "out.nc")\n')
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and 'below if __name__ == "__main__":' in done.stderr.splitlines()[-1]
+    assert not journal_of("out.nc").exists()
