@@ -54,12 +54,12 @@ def doubtful(plan: Plan, records: Sequence[Record], follow: bool) -> dict[int, i
     for point, record in enumerate(records):
         if record["status"] in HOPELESS:
             continue
-        sides = plan.neighbours(point)
-        if rank(record)[0]:
-            others = [other for side in sides for other in side if better(records[other], record)]
-        else:
+        sides, tier = plan.neighbours(point), rank(record)[0]
+        others = [other for side in sides for other in side if rank(records[other])[0] < tier]
+        if not others and tier < 2:
             others = [o for side in sides if all(better(records[o], record) for o in side) for o in side]
-            others = others or [o for o in plan.joined(point) if follow and rank(records[o])[0] == 0]
+        if not others and follow:
+            others = [other for other in plan.joined(point) if rank(records[other])[0] <= tier < 2]
         if others:
             found[point] = _best(others, records)
     return found

@@ -82,8 +82,10 @@ def test_a_bad_optimum_is_replaced_and_its_neighbours_are_looked_at(tmp_path):
 
 def test_a_smooth_sweep_costs_no_second_looks_but_at_its_ends(tmp_path):
     for function in (lambda x: x * x, lambda x: 1 / (1 + x), lambda x: (x - 7.3) ** 2 + 1):
-        _, tasks = swept(tmp_path, plan_of(20), lambda point, start, f=function: found(f(point)))
-        assert len(tasks) <= 22
+        for held in (True, False):
+            record = {"checks_hold": held}
+            _, tasks = swept(tmp_path, plan_of(20), lambda p, start, f=function, r=record: found(f(p)) | r)
+            assert len(tasks) <= 22
 
 
 def test_a_second_look_never_makes_it_worse_and_a_failed_check_never_wins(tmp_path):
