@@ -20,9 +20,9 @@ def test_the_free_flyer_has_a_better_path_on_the_other_side():
 
 def test_other_revolutions_are_other_optima():
     found = local_optima(load_problem("orbit_raise").make(), 3)
-    assert len(found) == 2
-    assert found[0].starts[0] == "default"
-    assert found[1].objective > 50 * found[0].objective
+    assert len(found) >= 2
+    assert found[0].objective < 1.7e-3  # on the coarse mesh 0.35 % above the optimum of 1.69032e-3
+    assert found[-1].objective > 50 * found[0].objective
 
 
 def test_the_same_starts_are_drawn_every_time():
