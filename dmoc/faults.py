@@ -53,7 +53,7 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: Guess) -> N
     raise ValueError(f"{name} or its derivative is not a finite number at the guess; {REMEDY}")
 
 
-REMEDY = "give a guess that stays where it is defined"
+REMEDY = "stay where it is defined, or give another guess"
 
 
 def _states(problem: TransferProblem, guess: Guess) -> tuple[np.ndarray, ...]:
@@ -72,8 +72,10 @@ def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
         if not finite.all():
             node = int(np.argmin(finite))
             where = _arguments(effect, [part[:, node] for part in state])
-            name = type(effect).__name__
-            return f"{name} is not a finite number at node {node} of the guess: {where}; {REMEDY}"
+            place = {0: "at the start", finite.size - 1: "at the goal"}.get(
+                node, f"at node {node} of the guess"
+            )
+            return f"{type(effect).__name__} is not a finite number {place}: {where}; {REMEDY}"
     return f"the effects together are not a finite number at the guess; {REMEDY}"
 
 
