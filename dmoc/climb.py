@@ -34,12 +34,14 @@ UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
 ADVICE = {
     "infeasible": "no path near the guess meets every row; relax the duration, the force limit or a zone, "
     "or try another guess (this is a local verdict)",
-    "iteration limit": "raise options={'ipopt.max_iter': ...}, use fewer steps first, or give a better guess",
+    "iteration limit": "another number of steps helps most often, then another order, hold=True or a better "
+    "guess, and last options={'ipopt.max_iter': ...}",
     "invalid number": "the guess or an iterate met an undefined value (a distance of 0, say): change the guess",
-    "restoration failed": "look for contradictory or repeated conditions, then try another guess",
+    "restoration failed": "another number of steps or another order helps most often; if not, look for "
+    "contradictory or repeated conditions, then try another guess",
     "diverging": "the objective has no lower bound here; limit the force or the duration",
     "stopped": "interrupted; the best iterate is kept",
-    "failed": "try another guess, another number of steps, or hold=True",
+    "failed": "try another number of steps, another order, hold=True, or another guess",
 }
 
 
@@ -89,13 +91,28 @@ class Climb:
                 return False
             # a coarse mesh may have no path where a finer one does: then go on from the first guess
             known = self.path if solved else first
-        return solved
+        return solved or self._by_half(first)
+
+    @property
+    def _unexplained(self) -> bool:
+        """Whether the last attempt failed without a reason; one that the user cut short has a reason."""
+        limited = any("max_" in name for name in self.options or ())
+        return self.answer.status in UNEXPLAINED and not limited and not (self.cause and self.cause.words())
+
+    def _by_half(self, first: Guess) -> bool:
+        """Where nothing tells why a mesh fails, one of half as many steps often does not."""
+        if not self._unexplained or len(first.mesh) < 9:
+            return False
+        failed, half = (self.nlp, self.answer), np.append(first.mesh[:-1:2], 1.0)
+        if self.solve_on(first.onto(half, first.order, first.hold)):
+            return self.solve_on(self.path.onto(first.mesh, first.order, first.hold))
+        if self.answer.status != "stopped":
+            self.nlp, self.answer = failed
+        return False
 
     def _explained(self, start: Guess, rounding: float | None) -> bool:
         """Say why there is no path near a guess; where there is one, solve again from it."""
-        limited = any("max_" in name for name in self.options or ())
-        unknown = self.answer.status in UNEXPLAINED and not limited
-        if not unknown or self.cause is not None or len(start.position) > MOST_EXPLAINED:
+        if not self._unexplained or self.cause is not None or len(start.position) > MOST_EXPLAINED:
             return False
         cause = cause_of(self._rounded(rounding), start)
         if cause.path is not None:
