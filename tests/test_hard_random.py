@@ -20,9 +20,10 @@ def orbit_raise(random):
     radius, angle = random.uniform(1.1, 2.5), random.uniform(0.5, 2.5) * 2 * np.pi
     # about as long as the mean of both circles takes for that angle
     duration = angle * 0.5 * (1 + radius**1.5) * random.uniform(0.9, 1.1)
+    begin = random.uniform(0, 2 * np.pi)
     start, goal = (
         State(r * np.array([np.cos(a), np.sin(a)]), np.array([-np.sin(a), np.cos(a)]) / np.sqrt(r))
-        for r, a in ((1.0, (begin := random.uniform(0, 2 * np.pi))), (radius, begin + angle))
+        for r, a in ((1.0, begin), (radius, begin + angle))
     )
     return replace(load_problem("orbit_raise").make(), start=start, goal=goal, duration=duration)
 
