@@ -13,11 +13,6 @@ A. E. Bryson, Y.-C. Ho, Applied Optimal Control (1975), section 2.5.
 
 from dmoc import CircularOrbit, Condition, Engine, FinalRadius, PointGravity, State, Time, TransferProblem
 
-REFERENCES = (
-    ({}, 3.31922028, "Bryson & Ho 1975: 3.3192; indirect shooting"),
-    ({"duration": 3.3193}, 1.52502839, "Bryson & Ho 1975: 1.525; indirect shooting"),
-)
-
 
 def circular(t, q, v, m):
     """Across the position, at the speed of a circular orbit."""

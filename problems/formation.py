@@ -12,8 +12,6 @@ import math
 
 from dmoc import ApproachCone, BallForce, ClohessyWiltshire, State, TransferProblem
 
-REFERENCES = (({}, 4.0624844, "own: 1600 steps of order 4, 100 of order 8"),)
-
 
 def problem(
     start: tuple = (-90.0, -400.0, 40.0),

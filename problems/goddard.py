@@ -18,8 +18,6 @@ import casadi as ca
 
 from dmoc import FinalHeight, Force, Nozzles, PointGravity, State, TransferProblem
 
-REFERENCES = (({}, 1.012836918, "COPS 3.0: 1.01283; collocation in three phases"),)
-
 
 @dataclass(frozen=True)
 class ThinningAir(Force):

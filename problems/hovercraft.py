@@ -10,8 +10,6 @@ from above with held ones).
 
 from dmoc import BallForce, KeepIn, KeepOut, LinearDrag, State, Time, TransferProblem
 
-REFERENCES = (({}, 10.97479, "own: 3200 steps of order 2, nodal and held"),)
-
 GATES = ((5.0, 2.0), (11.0, -2.0), (17.0, 1.5), (22.0, -1.0))
 PILLAR = 2.5
 

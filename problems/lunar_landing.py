@@ -10,8 +10,6 @@ J. S. Meditch, On the problem of optimal thrust programming for a lunar soft lan
 
 from dmoc import Fuel, Nozzles, State, TransferProblem, UniformGravity
 
-REFERENCES = (({}, 8.246211251, "closed form (Meditch 1964)"),)
-
 
 def problem(height: float = 10.0, speed: float = 2.0, gravity: float = 1.5, thrust: float = 3.0):
     """The landing.

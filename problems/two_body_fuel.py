@@ -11,8 +11,6 @@ and with forty 0.92292.
 
 from dmoc import Engine, Fuel, PointGravity, State, TransferProblem
 
-REFERENCES = (({}, 0.0767810993, "indirect shooting; 0.080306 with ten segments of constant thrust"),)
-
 
 def problem(
     duration: float = 11.0, thrust: float = 0.037098971584147, exhaust_velocity: float = 0.98775405042502
