@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from dmoc import study_command, sweep_command
+from dmoc import stability_command, study_command, sweep_command
 from dmoc.cli_parts import (
     BAD_INPUT,
     INTERRUPTED,
@@ -260,6 +260,11 @@ app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:2
 app.command(
     "study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"
 )(study_command.study)
+
+
+app.command("stability", epilog="Example: dmoc stability --revolutions 1000 --plot stability.png")(
+    stability_command.stability
+)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:

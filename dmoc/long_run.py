@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -17,7 +17,7 @@ from dmoc.mechanics import Dynamics, step_map, weighted
 from dmoc.problem import TransferProblem
 
 ADAPTIVE = "DOP853, adaptive"
-# Steps a revolution; of the integrator that chooses its steps, the relative tolerance.
+# Steps a revolution at e = 0.3; of the integrator that chooses its steps, the relative tolerance.
 PER_REVOLUTION: dict[str, Sequence[float]] = {
     "order 2": (100, 300, 900),
     "order 4": (30, 60, 120),
@@ -27,6 +27,8 @@ PER_REVOLUTION: dict[str, Sequence[float]] = {
     "DOP853": (10, 20, 40),
     ADAPTIVE: (1e-9,),
 }
+# Points of a history; as the errors are running maxima, none is lost between two of them.
+SAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,8 @@ class Drift:
         the energy only oscillates, near 10 where it drifts [-].
     seconds : float
         Seconds a revolution, without building the step.
+    history : array, shape (3, count)
+        Revolutions so far, from the first on, and the largest energy and angular momentum errors until then.
     """
 
     method: str
@@ -56,6 +60,7 @@ class Drift:
     momentum_error: float
     growth: float
     seconds: float
+    history: np.ndarray = field(repr=False, compare=False)
 
 
 def kepler(eccentricity: float) -> TransferProblem:
@@ -65,6 +70,16 @@ def kepler(eccentricity: float) -> TransferProblem:
         raise ValueError(f"eccentricity must be less than 1 for an orbit that closes; got {e:g}")
     here = State((1 - e, 0), (0, np.sqrt((1 + e) / (1 - e))))
     return TransferProblem(1.0, here, here, 2 * np.pi, effects=(PointGravity(1.0),), name=f"e = {e:g}")
+
+
+def per_revolution(eccentricity: float) -> dict[str, Sequence[float]]:
+    """Steps a revolution of an orbit, which pass its periapsis as finely as `PER_REVOLUTION` at e = 0.3."""
+    # the time a passage takes goes with r^1.5
+    finer = max(1.0, (0.7 / (1 - eccentricity)) ** 1.5)
+    return {
+        name: counts if name == ADAPTIVE else tuple(round(count * finer) for count in counts)
+        for name, counts in PER_REVOLUTION.items()
+    }
 
 
 def drift(
@@ -106,8 +121,19 @@ def drift(
         for choice in choices:
             march = _adaptive if name == ADAPTIVE else _fixed
             t, q, p, spent = march(name, choice, dynamics, problem, period, duration)
-            steps, changes = (len(t) - 1) / revolutions, _changes(dynamics, problem, t, q, p)
-            rows.append(Drift(name, steps, revolutions, *changes, spent / revolutions))
+            energy, turning = _energy_error(dynamics, problem, t, q, p), _turning_error(problem, q, p)
+            rows.append(
+                Drift(
+                    name,
+                    (len(t) - 1) / revolutions,
+                    revolutions,
+                    float(energy.max()),
+                    float(turning.max()),
+                    _growth(t, energy),
+                    spent / revolutions,
+                    _history((t - t[0]) / period, energy, turning),
+                )
+            )
     return rows
 
 
@@ -119,7 +145,7 @@ def _fixed(
     times = problem.start_time + duration / steps * np.arange(steps + 1)
     position, velocity = problem.start.fixed()
     canonical = name.startswith("order ")
-    step = _variational(int(name[6:]), dynamics, problem) if canonical else _explicit(name, dynamics, problem)
+    step = step_function(name, dynamics, problem)
     if canonical:
         velocity = _momenta(dynamics, times[:1], position[None], velocity[None], problem.mass)[0]
     begin = np.concatenate([position, velocity])
@@ -130,6 +156,12 @@ def _fixed(
     states = np.vstack([begin, found.full().T])
     q, p = states[:, :n], states[:, n:]
     return times, q, p if canonical else _momenta(dynamics, times, q, p, problem.mass), spent
+
+
+def step_function(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
+    """(state, t, h) -> the state one step later: position and momentum of a scheme, else velocity [m, m/s]."""
+    canonical = name.startswith("order ")
+    return _variational(int(name[6:]), dynamics, problem) if canonical else _explicit(name, dynamics, problem)
 
 
 def _variational(order: int, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
@@ -197,25 +229,33 @@ def _momenta(dynamics: Dynamics, t: np.ndarray, q: np.ndarray, v: np.ndarray, ma
     return dynamics.point(t[None], q.T, v.T, mass)[1].full().T
 
 
-def _changes(
+def _energy_error(
     dynamics: Dynamics, problem: TransferProblem, t: np.ndarray, q: np.ndarray, p: np.ndarray
-) -> tuple[float, float, float]:
-    """Largest relative errors of energy and angular momentum, and growth of the first."""
+) -> np.ndarray:
     v = dynamics.velocity(t[None], q.T, p.T, problem.mass)
     energy = dynamics.energy(t[None], q.T, v, problem.mass).full().ravel()
-    error = np.abs(energy - energy[0]) / (abs(energy[0]) or 1.0)
+    return np.abs(energy - energy[0]) / (abs(energy[0]) or 1.0)
+
+
+def _growth(t: np.ndarray, error: np.ndarray) -> float:
     tenth = 0.1 * (t[-1] - t[0])
     early, late = error[t <= t[0] + tenth].max(), error[t >= t[-1] - tenth].max()
-    return float(error.max()), _turning(problem, q, p), float(late / early) if early else np.nan
+    return float(late / early) if early else np.nan
 
 
-def _turning(problem: TransferProblem, q: np.ndarray, p: np.ndarray) -> float:
-    """Largest relative change of the angular momentum about the first attractor, or the origin."""
+def _history(revolutions: np.ndarray, *errors: np.ndarray) -> np.ndarray:
+    begin, end = min(1.0, revolutions[-1]), revolutions[-1]
+    places = np.unique(np.searchsorted(revolutions, np.geomspace(begin, end, SAMPLES)))
+    return np.stack([revolutions[places], *(np.maximum.accumulate(error)[places] for error in errors)])
+
+
+def _turning_error(problem: TransferProblem, q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Relative change of the angular momentum about the first attractor, or the origin."""
     n = problem.dimension
     arm, push = (np.pad(x, ((0, 0), (0, 3 - n))) for x in (q - _centre(problem), p))
     spin = np.cross(arm, push)
     size = np.linalg.norm(spin[0])
-    return float(np.linalg.norm(spin - spin[0], axis=1).max() / size) if size else np.nan
+    return np.linalg.norm(spin - spin[0], axis=1) / size if size else np.full(len(q), np.nan)
 
 
 def _attractor(problem: TransferProblem) -> PointGravity | None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dmoc.files import whole_file
-from dmoc.long_run import Drift
 from dmoc.plot import SUFFIXES
 from dmoc.plot_style import DARK, SETTINGS
 from dmoc.study import Trial
@@ -45,19 +44,15 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
     ValueError
         If the suffix is another one, the folder does not exist, or nothing was solved.
     """
-    _save(study_figure(trials, title), path)
+    save_page(study_figure(trials, title), path)
 
 
-def save_drift(runs: Sequence[tuple[str, Sequence[Drift]]], path: str | os.PathLike) -> None:
-    """Draw drift against time into a file, whole or not at all; see `drift_figure` and `save_study`."""
-    _save(drift_figure(runs), path)
-
-
-def _save(page: Figure, path: str | os.PathLike) -> None:
+def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150) -> None:
+    """Write a figure into a .png, .pdf or .svg file, whole or not at all; ValueError if it cannot be."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     with whole_file(path) as temporary:
-        page.savefig(temporary, dpi=150)
+        page.savefig(temporary, dpi=dpi)
 
 
 def study_figure(trials: Sequence[Trial], title: str = "") -> Figure:
@@ -87,32 +82,6 @@ def study_figure(trials: Sequence[Trial], title: str = "") -> Figure:
     return page
 
 
-def drift_figure(runs: Sequence[tuple[str, Sequence[Drift]]]) -> Figure:
-    """A matplotlib Figure of energy error against time a revolution, a panel for each orbit by its name."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(SETTINGS):
-        page = Figure(figsize=(13.33, 7.5), layout="constrained")
-        panels = page.subplots(1, len(runs), sharex=True, sharey=True, squeeze=False)[0]
-        ends = []
-        for axes, (name, rows) in zip(panels, runs, strict=True):
-            curves = {
-                method: [(1e6 * row.seconds, row.energy_error) for row in rows if row.method == method]
-                for method in dict.fromkeys(row.method for row in rows)
-            }
-            ends.append(_draw(axes, curves))
-            axes.set_title(name)
-            axes.set_xlabel("time a revolution [\u00b5s]")
-        # the panels share their limits: only now are these known
-        for axes, found in zip(panels, ends, strict=True):
-            _label(axes, found)
-        panels[0].set_ylabel(
-            f"largest relative error of the energy in {runs[0][1][0].revolutions:g} revolutions"
-        )
-    return page
-
-
 def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple]:
     """Draw curves; where each ends, with its name and colour."""
     axes.set_xscale("log")
@@ -124,11 +93,11 @@ def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple
         style = _style(name, others)
         axes.plot(x, np.maximum(y, 1e-16), label=name, markersize=6, **style)
         ends.append((x[-1], max(y[-1], 1e-16), name, style["color"]))
-    _plain_numbers(axes.xaxis)
+    plain_numbers(axes.xaxis)
     return ends
 
 
-def _plain_numbers(axis: Any) -> None:
+def plain_numbers(axis: Any) -> None:
     """20 rather than 2 times ten to the first; at 1, 2 and 5 of every decade if there is room."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 

@@ -17,7 +17,6 @@ from dmoc.formulation import Formulation as Formulation
 from dmoc.formulation import Method, Run, counted, solve_other
 from dmoc.guess import starting_guess
 from dmoc.lobatto import scheme
-from dmoc.long_run import drift as drift
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem

@@ -2,6 +2,7 @@
 
     ./scripts/run python scripts/gallery.py                   # all of them
     ./scripts/run python scripts/gallery.py goddard           # some; the pictures of the others stay
+    ./scripts/run python scripts/gallery.py stability         # the long runs of `dmoc stability`, two minutes
 
 Pictures go to problems/gallery. The exit code is 1 if a problem is not solved or fails a check.
 """
@@ -12,12 +13,17 @@ from pathlib import Path
 from dmoc import solve, verify
 from dmoc.docstrings import first_line
 from dmoc.library import load_problem
+from dmoc.long_run import drift, kepler, per_revolution
+from dmoc.marching import growth, round_off
 from dmoc.plot import save_figure
+from dmoc.plot_stability import stability_figure
+from dmoc.plot_study import save_page
 from dmoc.solution import Solution
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"
 DPI = 90  # 1200 pixels wide
+LONG_RUNS = "stability"
 
 
 def row(name: str, words: str, solution: Solution, holds: bool) -> str:
@@ -29,11 +35,20 @@ def row(name: str, words: str, solution: Solution, holds: bool) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def draw_long_runs() -> None:
+    """What `dmoc stability --revolutions 1000 --steps 1000000` draws."""
+    runs = [(f"e = {e}", drift(kepler(e), 1000, per_revolution(e))) for e in (0.3, 0.7)]
+    save_page(stability_figure(runs, round_off(), growth()), GALLERY / f"{LONG_RUNS}.png", DPI)
+
+
 def main(names: list[str]) -> int:
     GALLERY.mkdir(exist_ok=True)
+    if LONG_RUNS in names or not names:
+        draw_long_runs()
     print("| problem | what it is | command | objective | s |", "|---|---|---|---|---|", sep="\n")
     worst = 0
-    for name in names or sorted(path.stem for path in PROBLEMS.glob("*.py")):
+    wanted = names or sorted(path.stem for path in PROBLEMS.glob("*.py"))
+    for name in [name for name in wanted if name != LONG_RUNS]:
         file = load_problem(str(PROBLEMS / f"{name}.py"))
         solution = solve(file.make())
         report = verify(solution) if solution.success else None

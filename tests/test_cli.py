@@ -374,7 +374,20 @@ def test_help_and_list_do_not_load_the_libraries(arguments):
 
 @pytest.mark.parametrize(
     "verb",
-    ["list", "show", "solve", "effects", "simulate", "check", "plot", "export", "study", "sweep", "doctor"],
+    [
+        "list",
+        "show",
+        "solve",
+        "effects",
+        "simulate",
+        "check",
+        "plot",
+        "export",
+        "stability",
+        "study",
+        "sweep",
+        "doctor",
+    ],
 )
 def test_every_verb_has_an_example(run, verb):
     code, out, _ = run(verb, "--help")

@@ -87,9 +87,11 @@ MAY_IMPORT = {
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
     "doctor": "library solver",
     "report_tables": "EFFECTS doctor influence report solution starts",
-    "study": "BASICS NLP MOTION ANSWER formulation long_run",
+    "study": "BASICS NLP MOTION ANSWER formulation",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
-    "plot_study": "files long_run plot plot_style study",
+    "marching": "BASICS EFFECTS PARTS long_run mechanics problem simulation",
+    "plot_study": "files plot plot_style study",
+    "plot_stability": "long_run marching plot_study plot_style",
     "report_study": "files study",
     "sweep_worker": "BASICS mesh problem solution solver verification library",
     "sweep_plan": "library",
@@ -113,10 +115,12 @@ MAY_IMPORT = {
     "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
     "cli_parts": "__init__ library plot report report_tables solution starts verification",
+    "stability_command": "cli_parts long_run marching plot_stability plot_study report",
     "study_command": "cli_parts formulation library plot_study report report_study study",
     "sweep_command": "cli_parts library report sweeping sweep_data sweep_journal sweep_loop sweep_plan",
     "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts "
-    "report_tables plot_sweep sweep_data sweep_command exporting cli_parts doctor study_command",
+    "report_tables plot_sweep sweep_data sweep_command exporting cli_parts doctor stability_command "
+    "study_command",
 }
 
 # one of each pair imports the other inside a function, when it is asked for
