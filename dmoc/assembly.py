@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -19,21 +20,15 @@ MOST_PICKED = 8
 
 
 @dataclass(frozen=True)
-class Block:
-    """rows(z, d, p) and cost(z, d, p), evaluated `count` times.
+class Kernel:
+    """rows(z, d, p) and cost(z, d, p) of one evaluation.
 
     Attributes
     ----------
     variables, data, parameters : SX columns
         Local unknowns z, numbers d that differ between evaluations, parameters p of the NLP.
     rows, cost : SX
-        Constraint rows (a column) and a scalar; rows with the same target are added up.
-    columns : int array, shape (len(z), count)
-        Which unknown each local one is; no unknown twice in one evaluation.
-    targets : int array, shape (len(rows), count)
-        Which constraint each row is added to.
-    values : array, shape (len(d), count)
-        The numbers d.
+        Constraint rows (a column) and a scalar.
     """
 
     name: str
@@ -42,6 +37,58 @@ class Block:
     parameters: ca.SX
     rows: ca.SX
     cost: ca.SX
+
+    @cached_property
+    def jacobian(self) -> ca.SX:
+        return ca.jacobian(self.rows, self.variables)
+
+    @cached_property
+    def hessian(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Upper triangle of the Hessian of weight cost + multipliers . rows, multipliers, weight."""
+        multipliers, weight = ca.SX.sym("lam", self.rows.numel()), ca.SX.sym("sigma")
+        lagrangian = weight * self.cost + ca.dot(multipliers, self.rows)
+        return ca.triu(ca.hessian(lagrangian, self.variables)[0]), multipliers, weight
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """Rows, cost, and the structural nonzeros of their derivatives."""
+        arguments = [self.variables, self.data, self.parameters]
+        hessian, multipliers, weight = self.hessian
+        outputs = {
+            "rows": (arguments, ca.densify(self.rows)),
+            "cost": (arguments, ca.densify(self.cost)),
+            "gradient": (arguments, ca.densify(ca.gradient(self.cost, self.variables))),
+            "jacobian": (arguments, _nonzeros(self.jacobian)),
+            "hessian": ([*arguments, multipliers, weight], _nonzeros(hessian)),
+        }
+        return {
+            kind: ca.Function(f"{self.name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()
+        }
+
+    @cached_property
+    def slope(self) -> ca.Function:
+        """(z, d, p, multipliers) -> gradient of cost + multipliers . rows, the rows, the cost."""
+        multipliers = ca.SX.sym("lam", self.rows.numel())
+        gradient = ca.gradient(self.cost + ca.dot(multipliers, self.rows), self.variables)
+        given = [self.variables, self.data, self.parameters, multipliers]
+        return ca.Function(self.name, given, [ca.densify(part) for part in (gradient, self.rows, self.cost)])
+
+
+@dataclass(frozen=True)
+class Block:
+    """A kernel that is evaluated `count` times.
+
+    Attributes
+    ----------
+    columns : int array, shape (len(z), count)
+        Which unknown each local one is; no unknown twice in one evaluation.
+    targets : int array, shape (len(rows), count)
+        Which constraint each row is added to; rows with the same target are added up.
+    values : array, shape (len(d), count)
+        The numbers d.
+    """
+
+    kernel: Kernel
     columns: np.ndarray
     targets: np.ndarray
     values: np.ndarray
@@ -49,35 +96,6 @@ class Block:
     @property
     def count(self) -> int:
         return self.columns.shape[1]
-
-    def kernels(self) -> dict[str, ca.Function]:
-        """One evaluation: rows, cost, and the structural nonzeros of their derivatives."""
-        multipliers, weight = ca.SX.sym("lam", self.rows.numel()), ca.SX.sym("sigma")
-        arguments = [self.variables, self.data, self.parameters]
-        jacobian = ca.jacobian(self.rows, self.variables)
-        lagrangian = weight * self.cost + ca.dot(multipliers, self.rows)
-        hessian = ca.triu(ca.hessian(lagrangian, self.variables)[0])
-        gradient = ca.gradient(self.cost, self.variables)
-        outputs = {
-            "rows": (arguments, ca.densify(self.rows)),
-            "cost": (arguments, ca.densify(self.cost)),
-            "gradient": (arguments, ca.densify(gradient)),
-            "jacobian": (arguments, _nonzeros(jacobian)),
-            "hessian": ([*arguments, multipliers, weight], _nonzeros(hessian)),
-        }
-        return {
-            kind: ca.Function(f"{self.name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()
-        }
-
-    def jacobian_pattern(self) -> ca.Sparsity:
-        """Where the Jacobian of one evaluation is not zero."""
-        return ca.jacobian(self.rows, self.variables).sparsity()
-
-    def hessian_pattern(self) -> ca.Sparsity:
-        """The same for the upper triangle of the Hessian."""
-        weight, multipliers = ca.SX.sym("sigma"), ca.SX.sym("lam", self.rows.numel())
-        lagrangian = weight * self.cost + ca.dot(multipliers, self.rows)
-        return ca.triu(ca.hessian(lagrangian, self.variables)[0]).sparsity()
 
 
 @dataclass(frozen=True)
@@ -130,11 +148,11 @@ def assemble(
             "jacobian": _jacobian_entries(block, weight, scale, rows),
             "hessian": _hessian_entries(block, scale, columns),
         }
-        for kind, kernel in block.kernels().items():
+        for kind, function in block.kernel.functions.items():
             # an output that is empty or structurally zero is not worth a map
-            if kernel.numel_out(0) == 0 or (kind in ("cost", "gradient") and block.cost.is_zero()):
+            if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and block.kernel.cost.is_zero()):
                 continue
-            found = kernel.map(block.count)(*given, *(local if kind == "hessian" else ()))
+            found = function.map(block.count)(*given, *(local if kind == "hessian" else ()))
             size, places = entries[kind]
             pieces[kind].append((found, None) if size is None else (found * _tiled(size), places))
 
@@ -177,13 +195,13 @@ def _columns(vector: ca.MX, scale: np.ndarray) -> ca.MX:
 
 def _jacobian_entries(block: Block, weight: np.ndarray, scale: np.ndarray, rows: int) -> tuple:
     """Scale and global place, column * rows + row, of every nonzero of every evaluation."""
-    row, column = block.jacobian_pattern().get_triplet()
+    row, column = block.kernel.jacobian.sparsity().get_triplet()
     return weight[row] * scale[column], block.columns[column] * rows + block.targets[row]
 
 
 def _hessian_entries(block: Block, scale: np.ndarray, columns: int) -> tuple:
     """The same for the upper triangle of the Hessian."""
-    row, column = block.hessian_pattern().get_triplet()
+    row, column = block.kernel.hessian[0].sparsity().get_triplet()
     first, second = block.columns[row], block.columns[column]
     return scale[row] * scale[column], np.maximum(first, second) * columns + np.minimum(first, second)
 

@@ -24,7 +24,7 @@ class Case:
     def __init__(self, solution: Solution):
         self.solution, self.path = solution, solution.path
         self.problem: TransferProblem = solution.require_problem()
-        self.dynamics = Dynamics(self.problem.dimension, self.problem.effects, self.problem.actuator)
+        self.dynamics = Dynamics.of(self.problem)
         self.rule, self.begin = scheme(self.path.order), self.problem.start_time
         self.time = self.begin + self.path.duration * self.path.fractions
         self.at = step_nodes(len(self.path.mesh) - 1, self.rule)

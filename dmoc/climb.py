@@ -52,7 +52,7 @@ class Climb:
         self, problem: TransferProblem, options: dict[str, Any] | None = None, progress: Progress | None = None
     ):
         self.problem, self.options, self.progress = problem, options, progress
-        self.dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+        self.dynamics = Dynamics.of(problem)
         self.interrupt = Interrupt()
         self.levels: list[Level] = []
         self.cause: Cause | None = None

@@ -73,7 +73,7 @@ class Scene:
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        return Dynamics(self.problem.dimension, self.problem.effects, self.problem.actuator)
+        return Dynamics.of(self.problem)
 
     @property
     def axes(self) -> int:

@@ -138,7 +138,7 @@ def _row(
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
         return value * problem.mass / weight, "N"
     if group.name.startswith("mass_"):
-        return value * nlp.units.mass, "kg"
+        return value, "kg"
     constraint = _constraint(problem, group.name)
     if isinstance(constraint, KeepOut):
         return constraint.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from dmoc.assembly import Block
 from dmoc.blocks import Transcript
 from dmoc.effects import (
     J2,
@@ -113,7 +112,7 @@ def _one(problem: TransferProblem, path: Guess, effect: Effect, listed: bool) ->
 
 
 def _dynamics(problem: TransferProblem) -> Dynamics:
-    return Dynamics(problem.dimension, problem.effects, problem.actuator)
+    return Dynamics.of(problem)
 
 
 def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect) -> float:
@@ -133,8 +132,8 @@ def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect)
 def _instructions(problem: TransferProblem, path: Guess) -> int:
     """Instructions of one evaluation of each block with its derivatives."""
     script = Transcript(problem, scheme(path.order), path.hold, path.mesh, units_of(problem, path))
-    blocks: list[Block] = script.blocks
-    return sum(kernel.n_instructions() for block in blocks for kernel in block.kernels().values())
+    kernels = [block.kernel for block in script.blocks]
+    return sum(part.n_instructions() for kernel in kernels for part in kernel.functions.values())
 
 
 def _seconds(problem: TransferProblem, path: Guess) -> float:

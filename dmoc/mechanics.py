@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
@@ -33,6 +33,7 @@ import numpy as np
 
 from dmoc.actuators import Actuator, FreeForce
 from dmoc.effects.base import Conservative, Effect, Force
+from dmoc.kept import kept
 from dmoc.lobatto import Scheme
 
 
@@ -43,6 +44,12 @@ class Dynamics:
     dimension: int
     effects: tuple[Effect, ...] = ()
     actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+
+    @classmethod
+    def of(cls, problem: Any) -> Dynamics:
+        """What acts and pushes in a transfer problem, with the functions made for it before."""
+        parts = problem.dimension, problem.effects, problem.actuator
+        return kept(partial(cls, *parts), "dynamics", *parts)
 
     @cached_property
     def point(self) -> ca.Function:
@@ -83,6 +90,15 @@ class Dynamics:
         change = ca.jacobian(dldv, q) @ v + ca.jacobian(dldv, t)
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
         return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
+
+    @cached_property
+    def linearised(self) -> tuple[ca.Function, bool]:
+        """(t, q, v, m) -> d(q', v')/d(q, v) of the motion without thrust, and whether it is constant."""
+        t, q, v, m = state_symbols(self.dimension)
+        rate = self.acceleration(t, q, v, m, ca.DM.zeros(self.dimension))
+        jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
+        constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v, *([m] if self.actuator.burns else [])))
+        return ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)]), constant
 
     @cached_property
     def depends_on_velocity(self) -> bool:
@@ -174,6 +190,10 @@ def step_map(dynamics: Dynamics, scheme: Scheme, hold: bool = False) -> ca.Funct
     `v` are the velocities of the step at its nodes (dimension, s+1). Explicit at order 2 where no
     effect looks at the velocity, Newton's method down to round-off elsewhere.
     """
+    return kept(partial(_step_map, dynamics, scheme, hold), "step", dynamics, scheme.order, hold)
+
+
+def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     n, s = dynamics.dimension, scheme.degree
     q, p, origin = (ca.SX.sym(name, n) for name in ("q", "p", "origin"))
     t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)

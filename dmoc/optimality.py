@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from dmoc.blocks import Transcript
@@ -106,12 +105,7 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
     unknowns, multipliers = x * nlp.columns.scales(), lam_g * nlp.rows.scales() * nlp.units.cost
     slope, rows, cost = np.zeros(len(x)), np.zeros(len(lam_g)), 0.0
     for block in blocks:
-        local = ca.SX.sym("lam", block.rows.numel())
-        gradient = ca.gradient(block.cost + ca.dot(local, block.rows), block.variables)
-        given = [block.variables, block.data, block.parameters, local]
-        outputs = [ca.densify(part) for part in (gradient, block.rows, block.cost)]
-        function = ca.Function(block.name, given, outputs)
-        values = function(unknowns[block.columns], block.values, p, multipliers[block.targets])
+        values = block.kernel.slope(unknowns[block.columns], block.values, p, multipliers[block.targets])
         np.add.at(slope, block.columns, values[0].full())
         np.add.at(rows, block.targets, values[1].full())
         cost += float(values[2].full().sum())

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.checks import number
+from dmoc.kept import kept
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map, step_momenta
 from dmoc.mesh import Guess, node_fractions, step_nodes, uniform_mesh
@@ -58,6 +60,10 @@ def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function
 
     q are the s + 1 positions stacked, from `origin` [m]; u the controls of the nodes stacked, or of the step.
     """
+    return kept(partial(_legendre_function, dynamics, order, hold), "legendre", dynamics, order, hold)
+
+
+def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
     rule, n = scheme(order), dynamics.dimension
     size = dynamics.actuator.size(n)
     q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
@@ -136,7 +142,7 @@ def simulate(
     ValueError
         If the start is not fixed, or the controls do not fit the mesh.
     """
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    dynamics = Dynamics.of(problem)
     position, velocity = problem.start.fixed()
     if np.isnan(position).any() or np.isnan(velocity).any():
         raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
@@ -233,16 +239,22 @@ def step_matrices(dynamics: Dynamics, path: Guess, start_time: float, momentum: 
 
     `momentum` are the momenta per mass at the step ends, shape (steps+1, axes) [m/s].
     """
-    n, steps = dynamics.dimension, len(path.mesh) - 1
-    advance, inputs = _advance(dynamics, path, start_time)
-    given = advance.mx_in()
-    tangent = ca.Function("tangent", given, [ca.densify(ca.jacobian(advance(*given), given[0]))])
-    if advance.is_a("SXFunction"):
-        tangent = tangent.expand()
-    ends = path.position[:: scheme(path.order).degree] - path.position[0]
+    n, steps, order, hold = dynamics.dimension, len(path.mesh) - 1, path.order, path.hold
+    tangent = kept(partial(_tangent, dynamics, order, hold), "tangent", dynamics, order, hold)
+    ends = path.position[:: scheme(order).degree] - path.position[0]
     states = np.concatenate([ends[:-1], momentum[:-1]], axis=1).T
-    matrices = np.array(tangent.map(steps)(states, *inputs))
+    matrices = np.array(tangent(states, *_inputs(path, start_time), path.position[0]))
     return matrices.reshape(2 * n, steps, 2 * n).transpose(1, 0, 2)
+
+
+def _tangent(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(state, m, u, t, h, origin) -> derivative of the state one step later."""
+    step, n = step_map(dynamics, scheme(order), hold), dynamics.dimension
+    given, state = step.mx_in()[2:], ca.MX.sym("state", 2 * n)
+    increments = ca.vertcat(*step(state[:n], state[n:], *given)[:2])
+    change = ca.DM.eye(2 * n) + ca.jacobian(increments, state)
+    tangent = ca.Function("tangent", [state, *given], [ca.densify(change)])
+    return tangent.expand() if step.is_a("SXFunction") else tangent
 
 
 def _advance(
@@ -253,14 +265,7 @@ def _advance(
     Compensated, the state is twice as long: its second half is what rounding has added so far.
     """
     rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
-    at = step_nodes(steps, rule)
-    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
-    times = start_time + path.duration * path.mesh[:-1]
-    lengths = path.duration * np.diff(path.mesh)
-    if np.array_equal(path.mesh, uniform_mesh(steps)):
-        # fractions differ by round-off, 1e-12 of a step in 20,000: steps must be equal to keep the energy
-        lengths[:] = path.duration / steps
-    inputs = [path.mass[at], control.T, times[None], lengths[None]]
+    inputs = _inputs(path, start_time)
     given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
     state = ca.MX.sym("state", 2 * n)
     increments = step_map(dynamics, rule, path.hold)(state[:n], state[n:], *given, path.position[0])
@@ -270,6 +275,19 @@ def _advance(
     # an explicit step has no root to find: as one plain expression it is three times as fast
     explicit = rule.degree == 1 and not dynamics.depends_on_velocity
     return advance.expand() if explicit else advance, inputs
+
+
+def _inputs(path: Guess, start_time: float) -> list[np.ndarray]:
+    """Masses, controls, begin and length of all steps, side by side."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    at = step_nodes(steps, rule)
+    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
+    times = start_time + path.duration * path.mesh[:-1]
+    lengths = path.duration * np.diff(path.mesh)
+    if np.array_equal(path.mesh, uniform_mesh(steps)):
+        # fractions differ by round-off, 1e-12 of a step in 20,000: steps must be equal to keep the energy
+        lengths[:] = path.duration / steps
+    return [path.mass[at], control.T, times[None], lengths[None]]
 
 
 def _compensated(state: ca.MX, given: list, increments: ca.MX) -> ca.Function:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 
 from dmoc.lobatto import scheme
-from dmoc.mechanics import Dynamics, state_symbols
+from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess
 from dmoc.simulation import step_matrices
 
@@ -64,13 +63,9 @@ def flow_matrices(
 ) -> tuple[np.ndarray, bool]:
     """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
     n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
-    t, q, v, m = state_symbols(n)
-    rate = dynamics.acceleration(t, q, v, m, ca.DM.zeros(n))
-    jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
-    function = ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)])
+    function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh
     stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
-    constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v, *([m] if dynamics.actuator.burns else [])))
     return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
 
 

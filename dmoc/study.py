@@ -250,7 +250,7 @@ def _miss(problem: TransferProblem, path: Guess | None, scales: tuple[float, flo
     """By how much the independent integrator misses the goal of a path, of an extent [m] or speed [m/s]."""
     if path is None or not np.isfinite(path.control).all():
         return np.nan
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    dynamics = Dynamics.of(problem)
     position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
     gaps = np.linalg.norm(position - path.position[-1]), np.linalg.norm(velocity - path.goal_velocity)
     return float(max(gaps[0] / scales[0], gaps[1] / scales[1]))

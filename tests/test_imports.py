@@ -16,11 +16,11 @@ import dmoc
 ROOT = Path(dmoc.__file__).parent
 
 GROUPS = {
-    "BASICS": "checks docstrings files layout lobatto rows",
+    "BASICS": "checks docstrings files kept layout lobatto rows",
     "EFFECTS": "effects effects.base effects.gravity effects.atmosphere effects.radiation effects.frames "
     "effects.motion effects.third_body",
     "PARTS": "actuators engines objectives constraints boundary elements orbits",
-    "NLP": "problem mechanics mesh assembly blocks guess transcription ipopt",
+    "NLP": "problem mechanics mesh assembly formulas blocks guess transcription ipopt",
     "MOTION": "reference simulation stability",
     "ANSWER": "solution results climb refine solver",
     "VERDICT": "case limits optimality verification",
@@ -32,6 +32,7 @@ MAY_IMPORT = {
     "checks": "",
     "docstrings": "",
     "files": "",
+    "kept": "",
     "layout": "",
     "lobatto": "",
     "rows": "",
@@ -53,18 +54,19 @@ MAY_IMPORT = {
     "orbits": "boundary checks elements rows",
     "problem": "actuators boundary checks constraints effects.base objectives",
     # the discrete equations, which know nothing of a transfer
-    "mechanics": "actuators effects.base lobatto",
+    "mechanics": "actuators effects.base kept lobatto",
     "mesh": "lobatto",
     "assembly": "",
     # motion forward in time; the guess and the refinement may use it
     "reference": "lobatto mechanics mesh",
-    "simulation": "checks lobatto mechanics mesh problem reference",
+    "simulation": "checks kept lobatto mechanics mesh problem reference",
     "stability": "lobatto mechanics mesh simulation",
     # the way from a problem to a solution
     "spiral": "",
     "coasting": "EFFECTS boundary mechanics problem spiral",
     "guess": "BASICS coasting constraints mechanics mesh problem simulation",
-    "blocks": "BASICS assembly mechanics mesh problem",
+    "formulas": "BASICS assembly mechanics problem",
+    "blocks": "BASICS assembly formulas mesh problem",
     "transcription": "BASICS assembly blocks guess mechanics mesh problem",
     "ipopt": "BASICS mesh problem transcription",
     "solution": "BASICS mesh problem results",  # results: save and load, see ALLOWED_CYCLES
@@ -109,8 +111,10 @@ MAY_IMPORT = {
     "export_code": "export_functions export_solver",
     "exporting": "__init__ BASICS NLP solver export_functions export_residual export_solver export_code",
     "plot_style": "BASICS mesh solution",
-    "plot_path": "BASICS EFFECTS PARTS solution plot_style",
-    "plot": "BASICS EFFECTS PARTS NLP solution verification plot_style plot_path",
+    "plot_scene": "BASICS EFFECTS PARTS solution plot_style",
+    "plot_path": "BASICS PARTS solution plot_scene plot_style",
+    "plot_ledger": "BASICS EFFECTS mechanics mesh simulation solution plot_style",
+    "plot": "BASICS PARTS solution verification plot_ledger plot_path plot_style",
     "plot_front": "plot_style sweep_data sweep_plan",
     "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",

@@ -62,7 +62,7 @@ def script(problem, order=2, hold=False):
 
 def counts(problem, order=2, hold=False):
     return {
-        block.name: {kind: kernel.n_instructions() for kind, kernel in block.kernels().items()}
+        block.kernel.name: {kind: part.n_instructions() for kind, part in block.kernel.functions.items()}
         for block in script(problem, order, hold).blocks
     }
 
