@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -33,15 +35,20 @@ def center_of(attractor: PointGravity, dimension: int) -> np.ndarray:
     return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
 
 
-def coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: np.ndarray) -> Any:
-    """Motion without thrust between two times since the start [s]; its status is 1 if it falls in."""
-    from scipy.integrate import solve_ivp
+def coast(problem: TransferProblem, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
+    """Positions and velocities without thrust at times since the start [s], from the first of them on.
+
+    Shape (count, 2 axes); None where the body falls into an attractor. Times may decrease.
+    """
+    from scipy.integrate import ODEintWarning, odeint
 
     # without what resists: backward in time drag feeds the motion without bound
     conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
-    dynamics = Dynamics(problem.dimension, conservative, problem.actuator)
+    dynamics = Dynamics.of(problem, conservative)
     n, still = problem.dimension, np.zeros(problem.dimension)
     centers = [center_of(attractor, n) for attractor in attractors_of(problem)]
+    least = [0.02 * np.linalg.norm(q - center) for center in centers]
+    fell_in = False
 
     # through CasADi's buffers, without copies: the arrays they point to live as long as this call
     acceleration = dynamics.acceleration
@@ -53,17 +60,22 @@ def coast(problem: TransferProblem, start: float, end: float, q: np.ndarray, v: 
     buffer.set_res(0, memoryview(pull))  # type: ignore[arg-type]
 
     def rate(t: float, state: np.ndarray) -> np.ndarray:
+        nonlocal fell_in
         arguments[0][0], arguments[1][:], arguments[2][:] = problem.start_time + t, state[:n], state[n:]
         evaluate()
-        return np.concatenate([state[n:], pull])
+        for center, near in zip(centers, least, strict=True):
+            fell_in |= math.dist(state[:n], center) < near
+        return np.concatenate([state[n:], np.zeros(n) if fell_in else pull])
 
-    def fell_in(t: float, state: np.ndarray) -> float:
-        return min((_distance(state[:n], at) - 0.02 * _distance(q, at) for at in centers), default=1.0)
-
-    fell_in.terminal = True  # type: ignore[attr-defined]
     sizes = [np.abs(q).max() or 1.0, np.abs(v).max() or 1.0]
-    settings = {"rtol": 1e-6, "atol": 1e-9 * np.repeat(sizes, n), "dense_output": True, "events": fell_in}
-    return solve_ivp(rate, (start, end), np.concatenate([q, v]), **settings)
+    settings = {"rtol": 1e-6, "atol": 1e-9 * np.repeat(sizes, n), "mxstep": 100_000}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ODEintWarning)
+        try:
+            states = odeint(rate, np.concatenate([q, v]), times, tfirst=True, **settings)
+        except ODEintWarning:
+            return None
+    return None if fell_in or not np.isfinite(states).all() else states
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -100,6 +112,9 @@ def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: b
         return None
     center, fill = center_of(attractor, n), np.zeros(3 - n)
     start, goal = ((np.append(q - center, fill), np.append(v, fill)) for q, v in states)
+    if not (np.any(start[0]) and np.any(goal[0])):
+        # in the attractor itself: refused, in words, when the effects are looked at
+        return None
     spiral = Spiral(attractor.mu, np.append(center, fill), duration, start, goal, from_goal)
     return spiral if spiral.eccentricity < 0.9 else None
 
@@ -136,7 +151,8 @@ def _carried(problem: TransferProblem, known: tuple, begin: float, end: Boundary
 
 def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
     """A state some time later, or earlier, without thrust."""
-    return tuple(np.split(coast(problem, begin, finish, *state).y[:, -1], 2))
+    states = coast(problem, np.array([begin, finish]), *state)
+    return state if states is None else tuple(np.split(states[-1], 2))
 
 
 def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:

@@ -7,16 +7,21 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.checks import short
 from dmoc.coasting import attractors_of, center_of, coast, end_estimates, lone_attractor, spiral_between
 from dmoc.constraints import KeepOut
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
-from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes
+from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.simulation import legendre_momenta
 
 # How near the centre of a keep-out zone a guess is pushed aside, and how far, in radii.
 CENTRAL, PUSH = 0.05, 0.3
+# Steps follow the motion where its rate around attractors varies more than this along the guess.
+UNEVEN, SAMPLES = 5.0, 1000
+# No coast is followed at more places than this.
+MOST_SAMPLES = 100_000
 
 
 def starting_guess(
@@ -60,6 +65,32 @@ def starting_guess(
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
+def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
+    """Rate of a circular orbit around all attractors, sqrt(sum mu / r^3) [1/s]; 0 without any."""
+    squares = np.zeros(len(position))
+    for attractor in attractors_of(problem):
+        distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
+        squares += attractor.mu / np.maximum(distance, 1e-300) ** 3
+    return np.sqrt(squares)
+
+
+def is_uneven(problem: TransferProblem, guess: Guess) -> bool:
+    """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
+    rates = orbital_rates(problem, guess.position)
+    return bool(rates.max() > UNEVEN * rates.min())
+
+
+def graded_guess(
+    problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
+) -> Guess:
+    """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
+    fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
+    rates = orbital_rates(problem, fine.position)
+    angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
+    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
+    return starting_guess(problem, mesh, order, hold, given)
+
+
 def _force_along(problem: TransferProblem, guess: Guess) -> np.ndarray:
     """The controls that take the body along a guess, by the discrete equations; within the limits.
 
@@ -69,7 +100,7 @@ def _force_along(problem: TransferProblem, guess: Guess) -> np.ndarray:
     more = problem.actuator.labels(n)[n:]
     if guess.control.shape[1] < n or more not in ((), ("throttle",)):
         return guess.control
-    dynamics, begin = Dynamics(n, problem.effects, problem.actuator), problem.start_time
+    dynamics, begin = Dynamics.of(problem), problem.start_time
     at, rows = step_nodes(len(guess.mesh) - 1, rule), np.zeros_like(guess.position)
     np.add.at(rows, at, legendre_momenta(dynamics, guess, begin))
     ends = ((0, begin, guess.start_velocity, 1), (-1, begin + guess.duration, guess.goal_velocity, -1))
@@ -109,20 +140,23 @@ def guess_duration(problem: TransferProblem) -> float:
 
 def _given_path(problem: TransferProblem, given: Any, duration: float, fractions: np.ndarray) -> np.ndarray:
     times = problem.start_time + duration * fractions
-    if callable(given):
-        position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times])
-    else:
-        try:
+    try:
+        if callable(given):
+            position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times])
+        else:
             known, values = (np.asarray(part, float) for part in given)
             values = values.reshape(len(known), -1)
+            if not (np.isfinite(known).all() and (np.diff(known) > 0).all()):
+                raise ValueError("its times do not increase")
             position = np.stack([np.interp(times, known, column) for column in values.T], axis=1)
-        except (TypeError, ValueError) as error:
-            raise ValueError(
-                "guess must be a function of time [s], a pair (times, positions) or a former solution; "
-                f"got {type(given).__name__} ({error})"
-            ) from None
+    except Exception as error:  # whatever a user's function raises
+        raise ValueError(
+            "guess must be a function of time [s] that gives positions [m], a pair (times, positions) or a "
+            f"former solution; {short(given)} fails: {' '.join(str(error).split())[:120]}"
+        ) from error
     if position.shape != (len(fractions), problem.dimension):
-        raise ValueError(f"guess has {position.shape[1]} axes but the problem has {problem.dimension}")
+        found = position.shape[-1] if position.ndim == 2 else f"{position.ndim - 1} times nested"
+        raise ValueError(f"guess has {found} axes but the problem has {problem.dimension}")
     return position
 
 
@@ -145,13 +179,14 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
     if spiral is not None:
         path = spiral.states(fractions)[0] + spiral.center
         return path[:, : problem.dimension], (v0, v1), True
-    forward = coast(problem, 0.0, duration, q0, v0)
-    backward = coast(problem, duration, 0.0, q1, v1)
-    if forward.status != 0 or backward.status != 0:
+    turns = duration * orbital_rates(problem, np.stack([q0, q1])).max()
+    sample = np.linspace(0.0, 1.0, int(np.clip(20 * turns, 2000, MOST_SAMPLES)))
+    forward = coast(problem, duration * sample, q0, v0)
+    backward = coast(problem, duration * sample[::-1], q1, v1)
+    if forward is None or backward is None:
         # a coast that falls into an attractor is no path to start from
         return _keep_clear(straight, attractors, q0, q1), (v0, v1), False
-    sample = np.linspace(0.0, 1.0, max(2000, 8 * forward.t.size, 8 * backward.t.size))
-    arcs = [arc.sol(sample * duration)[: problem.dimension].T for arc in (forward, backward)]
+    arcs = [forward[:, : problem.dimension], backward[::-1, : problem.dimension]]
     lone = lone_attractor(problem)
     if lone is not None:
         center = center_of(lone, problem.dimension)

@@ -46,9 +46,9 @@ class Dynamics:
     actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
 
     @classmethod
-    def of(cls, problem: Any) -> Dynamics:
-        """What acts and pushes in a transfer problem, with the functions made for it before."""
-        parts = problem.dimension, problem.effects, problem.actuator
+    def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:
+        """What acts and pushes in a transfer problem, or some of it, with the functions made for it before."""
+        parts = problem.dimension, problem.effects if effects is None else effects, problem.actuator
         return kept(partial(cls, *parts), "dynamics", *parts)
 
     @cached_property
