@@ -80,9 +80,7 @@ def is_uneven(problem: TransferProblem, guess: Guess) -> bool:
     return bool(rates.max() > UNEVEN * rates.min())
 
 
-def graded_guess(
-    problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
-) -> Guess:
+def graded_guess(problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None) -> Guess:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
     fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
     rates = orbital_rates(problem, fine.position)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dmoc.checks import number
 from dmoc.climb import Climb
-from dmoc.guess import starting_guess
+from dmoc.guess import graded_guess, is_uneven, starting_guess
 from dmoc.ipopt import Progress, scaled_multipliers
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
@@ -37,7 +37,9 @@ def solve(
     ----------
     problem : TransferProblem
     order : int
-        2 (the default, equation (16)), 4, 6 or 8.
+        2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
+        motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
+        the default is 4.
     steps : int
         Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8. Or `mesh`: the
         step ends as increasing fractions 0..1.
@@ -72,9 +74,11 @@ def solve(
         tol = _tolerance(tol)
         with climb.interrupt:
             return climb_to_tolerance(climb, tol, order, steps, hold, guess)
-    order = 2 if order is None else order
-    ends = check_mesh(DEFAULT_STEPS[order] if steps is None else steps, mesh)
-    first = starting_guess(problem, ends, order, hold, guess)
+    ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
+    first = starting_guess(problem, ends, order or 2, hold, guess)
+    if mesh is None and is_uneven(problem, first):
+        order = order or (2 if hold else 4)
+        first = graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
     with climb.interrupt:
         climb.up_to(first, guess)
     return climb.solution()

@@ -140,3 +140,14 @@ def test_drone_hop_meets_indirect_shooting():
     at_limit = thrust > 15 * (1 - 1e-4)
     assert at_limit[0] and not at_limit[-1]
     assert solution.position[:, 2].min() > -1e-9
+
+
+def test_halo_transfer_is_the_same_on_fine_meshes_and_no_worse_than_twenty_segments():
+    halo = make("halo_transfer")
+    default, fine = solve(halo), solve(halo, order=8, steps=100)
+    assert default.objective == pytest.approx(fine.objective, rel=2e-3)
+    assert fine.objective == pytest.approx(0.0154639, rel=2e-4)
+    # forward-backward shooting, the best of fourteen random starts
+    assert fine.final_mass > 0.98420
+    equal = solve(halo, order=4, mesh=np.linspace(0, 1, 101))
+    assert not verify(equal)["reference"].ok
