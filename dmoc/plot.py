@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dmoc.constraints import SpeedLimit
-from dmoc.effects.base import Force
 from dmoc.engines import Nozzles
 from dmoc.files import whole_file
-from dmoc.lobatto import scheme
-from dmoc.mechanics import Dynamics
-from dmoc.mesh import step_nodes
 from dmoc.objectives import Objective, Time
-from dmoc.plot_path import draw_path, entries_once
+from dmoc.plot_ledger import draw_ledger
+from dmoc.plot_path import burning, draw_path, entries_once, is_wide
 from dmoc.plot_style import (
     AXIS_COLOURS,
     AXIS_LINES,
@@ -40,6 +37,8 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".pdf", ".svg")
 SQUARED = "\u00b2"
+# A limit so many times the largest force would flatten the curves: its number stands in the legend.
+FAR = 6.0
 LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
@@ -90,21 +89,47 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
         page.set_layout_engine(
             "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
         )
-        grid = page.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
-        draw_path(page.add_subplot(grid[:, 0], projection="3d" if solution.dimension == 3 else None), solution)
-        panels = [page.add_subplot(grid[row, 1]) for row in range(3)]
+        wide = is_wide(solution)
+        path, panels = _panels(page, solution.dimension, wide)
+        draw_path(path, solution, beside=wide)
         size, unit = readable(solution.end_times, "s")
-        for panel, draw in zip(panels, (_draw_force, _draw_speed, _draw_ledger), strict=True):
+        for panel, draw in zip(panels, (_draw_force, _draw_speed, draw_ledger), strict=True):
             draw(panel, solution, size)
-            panel.legend(*entries_once(panel), loc="upper left", bbox_to_anchor=(1.01, 1.05), borderaxespad=0.0)
+            _shade_burns(panel, solution, size)
+            where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.05)}
+            if wide:
+                where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.3), "ncol": 2}
+            panel.legend(*entries_once(panel), borderaxespad=0.0, **where)
             panel.sharex(panels[0])
-            panel.tick_params(labelbottom=panel is panels[-1])
-        panels[-1].set_xlabel(f"time [{unit}]")
-        page.align_ylabels(panels)
+            panel.tick_params(labelbottom=wide or panel is panels[-1])
+        for panel in panels if wide else panels[-1:]:
+            panel.set_xlabel(f"time [{unit}]")
+        if not wide:
+            page.align_ylabels(panels)
         page.suptitle(_headline(solution), fontsize=16, color=DARK if solution.success else WARNING)
         words, good = _footnote(solution, report)
         page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
     return page
+
+
+def _panels(page: Figure, dimension: int, wide: bool) -> tuple[Any, list[Any]]:
+    """The path panel on the left, or above if it is wide, and those over time."""
+    if wide:
+        grid = page.add_gridspec(2, 3, height_ratios=(1.5, 1.0))
+        return page.add_subplot(grid[0, :]), [page.add_subplot(grid[1, column]) for column in range(3)]
+    grid = page.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+    path = page.add_subplot(grid[:, 0], projection="3d" if dimension == 3 else None)
+    return path, [page.add_subplot(grid[row, 1]) for row in range(3)]
+
+
+def _shade_burns(axes: Any, solution: Solution, late: float) -> None:
+    """Shade when an engine that also coasts is on."""
+    if (on := burning(solution)) is None:
+        return
+    times = solution.end_times if solution.hold else solution.time
+    on, step = (np.append(on, False), "post") if solution.hold else (on, None)
+    style = {"transform": axes.get_xaxis_transform(), "color": PUSH, "alpha": 0.18, "linewidth": 0, "zorder": 0}
+    axes.fill_between(times / late, 0, 1, where=on, step=step, **style).set_gid("engine on")
 
 
 def _draw_force(axes: Any, solution: Solution, late: float) -> None:
@@ -124,12 +149,12 @@ def _draw_force(axes: Any, solution: Solution, late: float) -> None:
             axes.stairs(values / size, times / late, baseline=None, **style)
         else:
             axes.plot(times / late, values / size, **style)
-    _draw_force_limits(axes, solution, size)
+    _draw_force_limits(axes, solution, size, unit)
     axes.set_ylabel(f"force [{unit}]")
     axes.set_title("Force of the actuator" + (", held over each step" if solution.hold else ""))
 
 
-def _draw_force_limits(axes: Any, solution: Solution, size: float) -> None:
+def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) -> None:
     if solution.problem is None:
         return
     actuator, n = solution.problem.actuator, solution.dimension
@@ -140,8 +165,12 @@ def _draw_force_limits(axes: Any, solution: Solution, size: float) -> None:
             levels, words = sides, "limit" if n == 1 else "limit of\na component"
     elif isinstance(actuator, Nozzles):
         words = "limit of\na nozzle"
+    largest = np.abs(solution.force).max(initial=0.0)
     for level in levels[np.isfinite(levels)]:
-        axes.axhline(level / size, label=words, **LIMIT)
+        if abs(level) < FAR * largest:
+            axes.axhline(level / size, label=words, **LIMIT)
+        else:
+            axes.plot([], [], label=f"{words}\n{abs(level) / size:.3g} {unit}", **LIMIT)
 
 
 def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
@@ -151,93 +180,11 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     for limit in solution.problem.constraints if solution.problem else ():
         if isinstance(limit, SpeedLimit):
             axes.axhline(limit.limit / size, label="limit", **LIMIT)
-    axes.set_ylim(bottom=0)
+    if np.nanmin(speed) < 0.5 * np.nanmax(speed):
+        # above that the changes are what there is to see
+        axes.set_ylim(bottom=0)
     axes.set_ylabel(f"speed [{unit}]")
     axes.set_title("Speed")
-
-
-def _draw_ledger(axes: Any, solution: Solution, late: float) -> None:
-    """Energy where it is kept, else momentum: what the body gained, and what it was given."""
-    book = _energy(solution)
-    if book is None:
-        _draw_momentum(axes, solution, late)
-        return
-    gained, given = book
-    total = sum(given.values())
-    size, unit = readable(np.append(gained, total), "J")
-    ends = solution.end_times / late
-    axes.plot(ends, gained / size, color=PATH, linewidth=6, alpha=0.35, label="energy\ngained")
-    styles = ((PUSH, "--"), (AXIS_COLOURS[2], "-."))
-    for (name, work), (colour, line) in zip(given.items(), styles, strict=False):
-        axes.plot(ends, work / size, color=colour, linestyle=line, label=name)
-    if len(given) > 1:
-        axes.plot(ends, total / size, color=DARK, linestyle=":", label="sum of work")
-    gap = np.abs(gained - total).max() / size
-    axes.set_ylabel(f"energy [{unit}]")
-    axes.set_title(f"Energy gained and work done (gap {gap:.1g} {unit})")
-
-
-def _energy(solution: Solution) -> tuple[np.ndarray, dict[str, np.ndarray]] | None:
-    """Energy gained since the start and the works done on the body, at the step ends [J].
-
-    None where the energy is not to be balanced: it depends on time, mass is lost, or the problem is
-    not at hand. The works are sums with the scheme's own weights, so the gap is of its order.
-    """
-    problem, path = solution.problem, solution.path
-    if problem is None or np.ptp(path.mass) > 0:
-        return None
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
-    if dynamics.depends_on_time:
-        return None
-    rule, mass = scheme(solution.order), path.mass[0]
-    ends = slice(None, None, rule.degree)
-    state = (solution.end_times[None], path.position[ends].T, solution.velocity.T, path.mass[ends][None])
-    energy = mass * np.array(dynamics.energy(*state)).ravel()
-    at = step_nodes(solution.steps, rule)
-    force = (
-        np.broadcast_to(solution.force, (len(at), *solution.force.shape)) if path.hold else solution.force[at]
-    )
-    works = {"work of\nthe force": _work(solution, force)}
-    if any(isinstance(effect, Force) for effect in problem.effects):
-        times, mass_at, v = solution.time[at], path.mass[at], _step_velocities(solution)
-        flat = (times.reshape(1, -1), path.position[at].reshape(-1, problem.dimension).T)
-        push = dynamics.point(*flat, v.reshape(-1, problem.dimension).T, mass_at.reshape(1, -1))[2]
-        works["work of\nthe effects"] = _work(solution, mass * np.array(push).T.reshape(v.shape))
-    return energy - energy[0], works
-
-
-def _work(solution: Solution, force: np.ndarray) -> np.ndarray:
-    """Work since the start at the step ends [J] of forces at the nodes of every step [N]."""
-    rule = scheme(solution.order)
-    power = np.sum(force * _step_velocities(solution), axis=2)
-    return np.append(0.0, np.cumsum(np.diff(solution.end_times) * (rule.weights @ power)))
-
-
-def _step_velocities(solution: Solution) -> np.ndarray:
-    """Velocities of every step at its nodes [m/s], shape (s+1, steps, axes)."""
-    rule = scheme(solution.order)
-    nodes = solution.position[step_nodes(solution.steps, rule)]
-    h = np.diff(solution.end_times)[:, None]
-    return np.einsum("ij,jkn->ikn", rule.derivative, nodes - nodes[0]) / h
-
-
-def _draw_momentum(axes: Any, solution: Solution, late: float) -> None:
-    rule, path = scheme(solution.order), solution.path
-    at = step_nodes(solution.steps, rule)
-    force = (
-        np.broadcast_to(solution.force, (len(at), *solution.force.shape)) if path.hold else solution.force[at]
-    )
-    pushes = np.einsum("j,jkn->kn", rule.weights, force / path.mass[at][:, :, None])
-    given = np.cumsum(np.diff(solution.end_times)[:, None] * pushes, axis=0)
-    given = np.concatenate([np.zeros((1, solution.dimension)), given])
-    gained = solution.momentum - solution.momentum[0]
-    size, unit = readable(np.concatenate([gained, given]), "m/s")
-    for i, axis in enumerate("xyz"[: solution.dimension]):
-        ends, colour = solution.end_times / late, AXIS_COLOURS[i]
-        axes.plot(ends, gained[:, i] / size, color=colour, linewidth=6, alpha=0.35, label=f"{axis} gained")
-        axes.plot(ends, given[:, i] / size, color=colour, linestyle=AXIS_LINES[i], label=f"{axis} from force")
-    axes.set_ylabel(f"p / m [{unit}]")
-    axes.set_title("Momentum per mass gained, and from the force")
 
 
 def _headline(solution: Solution) -> str:

@@ -3,34 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
 
 from dmoc.constraints import KeepIn, KeepOut
-from dmoc.effects.gravity import PointGravity
-from dmoc.plot_style import ATTRACTOR, DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
+from dmoc.engines import Engine, Nozzles
+from dmoc.plot_scene import Corners, draw_scene, view_of
+from dmoc.plot_style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
 from dmoc.solution import Solution
 
 MOST_DOTS = 40
 ARROWS = 20
-# Length of the longest force arrow, and how far beyond the path zones are shown, as parts of the extent.
-ARROW, REACH = 0.12, 0.5
+# Length of the longest force arrow, as a part of the extent.
+ARROW = 0.12
+# From this width on, over the height, a plane path gets a panel over the whole page.
+WIDE = 2.5
 
-Corners = tuple[np.ndarray, np.ndarray]
 
-
-def draw_path(axes: Any, solution: Solution) -> None:
-    """Path in the plane or in space, or position against time in one dimension."""
+def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
+    """Path in the plane or in space, or position against time in one dimension; the legend below or beside."""
     if solution.dimension == 1:
         _draw_line(axes, solution)
         return
     size, unit = readable(np.ptp(solution.position, axis=0), "m")
     path = within_steps(solution, solution.position)[1] / size
     tails, arrows, longest = _arrows(solution)
-    view = _view(solution, np.concatenate([path, (tails + arrows) / size]), size)
-    proxies = _draw_zones(axes, solution, view, size)
+    low, high = _view(solution)
+    view = low / size, high / size
+    proxies = draw_scene(axes, solution, view, size)
+    _mark_burns(axes, solution, solution.position.T / size)
     axes.plot(*path.T, color=PATH, label="path", zorder=3)
     if solution.steps <= MOST_DOTS:
         ends = solution.position[:: solution.order // 2] / size
@@ -43,7 +45,36 @@ def draw_path(axes: Any, solution: Solution) -> None:
         # drawn by the order given, else the path would hide behind what it passes in front of
         axes.computed_zorder = False
     _frame(axes, view, unit)
-    _legend(axes, proxies)
+    _legend(axes, proxies, beside)
+
+
+def is_wide(solution: Solution) -> bool:
+    """Whether a path in the plane and its surroundings are much wider than high."""
+    spans = np.subtract(*_view(solution)[::-1])
+    return solution.dimension == 2 and bool(spans[0] > WIDE * spans[1])
+
+
+def _view(solution: Solution) -> Corners:
+    tails, arrows, _ = _arrows(solution)
+    return view_of(solution, np.concatenate([solution.position, tails + arrows]))
+
+
+def burning(solution: Solution) -> np.ndarray | None:
+    """Where an engine that also coasts is on: a value a node, or a step if held; None for what never coasts."""
+    strength = np.linalg.norm(solution.force, axis=1)
+    on = strength > 0.02 * strength.max(initial=0.0)
+    switches = solution.problem is not None and isinstance(solution.problem.actuator, (Engine, Nozzles))
+    return on if switches and on.any() and not on.all() else None
+
+
+def _mark_burns(axes: Any, solution: Solution, curve: np.ndarray) -> None:
+    """A broad line under the curve of the nodes where the engine is on."""
+    if (on := burning(solution)) is None:
+        return
+    if solution.hold:
+        on = np.append(np.repeat(on, solution.order // 2), False)
+    shown = np.where(on, curve, np.nan)
+    axes.plot(*shown, color=PUSH, linewidth=7, alpha=0.4, solid_capstyle="butt", label="engine on", zorder=2)
 
 
 def _draw_line(axes: Any, solution: Solution) -> None:
@@ -56,6 +87,7 @@ def _draw_line(axes: Any, solution: Solution) -> None:
         elif isinstance(zone, KeepIn):
             for edge in (edge for edge in (*zone.lower, *zone.upper) if np.isfinite(edge)):
                 axes.axhline(edge / size, color=FORBIDDEN, linestyle="--", label="keep-in zone")
+    _mark_burns(axes, solution, np.array([solution.time / late, solution.position[:, 0] / size]))
     axes.plot(times / late, path[:, 0] / size, color=PATH, label="position")
     _mark_ends(axes, (times[:1] / late, path[:1, 0] / size), (times[-1:] / late, path[-1:, 0] / size))
     axes.set(xlabel=f"time [{unit_late}]", ylabel=f"x [{unit}]")
@@ -75,6 +107,9 @@ def _arrows(solution: Solution) -> tuple[np.ndarray, np.ndarray, float]:
     if solution.hold:
         ends = places[:: solution.order // 2]
         places = 0.5 * (ends[1:] + ends[:-1])
+    if (on := burning(solution)) is not None:
+        # coasting has nothing to show, and a burn may be short
+        places, force = places[on], force[on]
     few = np.unique(np.linspace(0, len(force) - 1, ARROWS).round().astype(int))
     places, force = places[few], force[few]
     strength = np.linalg.norm(force, axis=1)
@@ -90,98 +125,20 @@ def _draw_arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: floa
     if not len(tails):
         return []
     if tails.shape[1] == 2:
-        style = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.005, "zorder": 4}
+        style = {
+            "angles": "xy",
+            "scale_units": "xy",
+            "scale": 1.0,
+            "units": "inches",
+            "width": 0.03,
+            "zorder": 4,
+        }
     else:
         style = {"arrow_length_ratio": 0.3, "linewidth": 1.5, "zorder": 4}
     axes.quiver(*tails.T, *arrows.T, color=PUSH, **style).set_gid("force")
     unit_size, unit = readable(longest, "N")
     words = f"force, longest {longest / unit_size:.3g} {unit}"
     return [Line2D([], [], color=PUSH, marker=">", markersize=7, label=words)]
-
-
-def _view(solution: Solution, drawn: np.ndarray, size: float) -> Corners:
-    """Corners of what is shown: the path with its arrows, and as much of the scene as lies near it."""
-    # the last iterate of a failed solve may hold anything
-    drawn = drawn[np.isfinite(drawn).all(axis=1)]
-    low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else np.zeros((2, solution.dimension))
-    extent = float((high - low).max()) or 1.0
-    near, far = low - REACH * extent, high + REACH * extent
-    zones = solution.problem.constraints if solution.problem else ()
-    boxes = [(center / size, center / size) for center in _attractors(solution)]
-    for zone in zones:
-        if isinstance(zone, KeepOut):
-            center = np.array(zone.center)
-            boxes.append(((center - zone.radius) / size, (center + zone.radius) / size))
-        elif isinstance(zone, KeepIn):
-            # walls far away would make the path a dot
-            walls = (np.array(side) / size for side in (zone.lower, zone.upper))
-            boxes.append(tuple(np.where((w > near) & (w < far), w, low) for w in walls))  # type: ignore[arg-type]
-    for corner, opposite in boxes:
-        if (opposite > near).all() and (corner < far).all():
-            low, high = np.minimum(low, np.maximum(corner, near)), np.maximum(high, np.minimum(opposite, far))
-    return low - 0.05 * extent, high + 0.05 * extent
-
-
-def _attractors(solution: Solution) -> list[np.ndarray]:
-    """Centres of the point masses [m]."""
-    effects = solution.problem.effects if solution.problem else ()
-    centers = [effect.center for effect in effects if isinstance(effect, PointGravity)]
-    return [np.zeros(solution.dimension) if center is None else np.array(center) for center in centers]
-
-
-def _draw_zones(axes: Any, solution: Solution, view: Corners, size: float) -> list[Any]:
-    """Draw what is forbidden and what attracts; entries for the legend."""
-    from matplotlib.patches import Patch
-
-    proxies = []
-    for zone in solution.problem.constraints if solution.problem else ():
-        if isinstance(zone, KeepOut):
-            draw = _draw_disc if solution.dimension == 2 else _draw_sphere
-            draw(axes, np.array(zone.center) / size, zone.radius / size, view)
-            proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label="keep-out zone"))
-        elif isinstance(zone, KeepIn):
-            _draw_room(axes, np.array(zone.lower) / size, np.array(zone.upper) / size, view)
-    style = {"linestyle": "none", "marker": "o", "markerfacecolor": ATTRACTOR, "markeredgecolor": DARK}
-    for center in _attractors(solution):
-        if (center / size > view[0]).all() and (center / size < view[1]).all():
-            axes.plot(*(center[:, None] / size), markersize=13, label="attractor", **style)
-    return proxies
-
-
-def _draw_disc(axes: Any, center: np.ndarray, radius: float, view: Corners) -> None:
-    from matplotlib.patches import Circle
-
-    disc = Circle(tuple(center), radius, facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.4)
-    disc.set_gid("keep-out zone")
-    axes.add_patch(disc)
-
-
-def _draw_sphere(axes: Any, center: np.ndarray, radius: float, view: Corners) -> None:
-    from matplotlib.colors import LightSource
-
-    around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 37), np.linspace(0, np.pi, 19))
-    unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
-    surface = center[:, None, None] + radius * unit
-    # axes in space do not clip
-    inside = np.all([(s >= a) & (s <= b) for s, a, b in zip(surface, *view, strict=True)], axis=0)
-    surface = np.where(inside, surface, np.nan)
-    light = LightSource(azdeg=225, altdeg=50)
-    style = {"color": FORBIDDEN, "alpha": 0.35, "linewidth": 0, "lightsource": light, "zorder": 1}
-    axes.plot_surface(*surface, **style).set_gid("keep-out zone")
-
-
-def _draw_room(axes: Any, lower: np.ndarray, upper: np.ndarray, view: Corners) -> None:
-    """The edges of a box, as far as they are in view."""
-    n = len(lower)
-    for along in range(n):
-        others = [axis for axis in range(n) if axis != along]
-        span = max(lower[along], view[0][along]), min(upper[along], view[1][along])
-        for corner in product(*[(lower[axis], upper[axis]) for axis in others]):
-            if not all(view[0][axis] < c < view[1][axis] for axis, c in zip(others, corner, strict=True)):
-                continue
-            edge = np.empty((n, 2))
-            edge[along], edge[others] = span, np.array(corner)[:, None]
-            axes.plot(*edge, color=FORBIDDEN, linestyle="--", label="keep-in zone")
 
 
 def _frame(axes: Any, view: Corners, unit: str) -> None:
@@ -203,21 +160,24 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
         # a short side has room for few numbers
         axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
         # matplotlib measures this distance along the other two sides; make it the same for all three
-        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, 7.0)
+        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, 9.0)
     for artist in (*axes.lines, *axes.collections):
         # the enlarged box reaches beyond the rectangle that would clip it; only its sides are laid out
         artist.set_clip_on(False)
         artist.set_in_layout(False)
     # a tall box would reach into the legend below
-    axes.set_box_aspect(spans, zoom=0.95 if spans[2] > 1.5 * spans[:2].max() else 1.07)
+    axes.set_box_aspect(spans, zoom=0.88 if spans[2] > 1.2 * spans[:2].max() else 1.07)
     axes.set_anchor("N")
     axes.view_init(elev=25, azim=-60)
 
 
-def _legend(axes: Any, proxies: list[Any]) -> None:
-    """Below the panel."""
+def _legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
+    """Below the panel, or to its right."""
     handles, labels = entries_once(axes, proxies)
-    columns = -(-len(labels) // 2) if len(labels) > 4 else 4
+    if beside:
+        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        return
+    columns = 3 if len(labels) > 4 else 4
     below = -0.06 if axes.name == "3d" else -0.11
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from dmoc import (
+    J2,
+    ApproachCone,
     BallForce,
     BoxForce,
     Conservative,
@@ -22,8 +24,10 @@ from dmoc import (
     State,
     Time,
     TransferProblem,
+    UniformGravity,
     load,
     solve,
+    three_body,
 )
 from dmoc.plot import figure, save_figure
 from dmoc.plot_style import readable, within_steps
@@ -272,19 +276,108 @@ class Shaken(Conservative):
         return 0.01 * ca.sin(t) * q[0]
 
 
-def test_where_energy_is_not_kept_momentum_is_shown():
-    solution = solve(room(effects=[Shaken()]), steps=20)
-    assert "Momentum" in panels(solution)["ledger"].get_title(loc="left")
-
-
-def test_without_effects_the_momentum_is_the_impulse():
-    engine = Engine(1.2, exhaust_velocity=100.0, dry_mass=5.0)
-    solution = solve(room(actuator=engine, objective=Fuel(), constraints=()), steps=20, hold=True)
-    axes = panels(solution)["ledger"]
-    curves = {curve.get_label(): curve.get_ydata() for curve in axes.lines}
+@pytest.mark.parametrize("hold", [False, True], ids=["nodal", "held"])
+def test_where_energy_is_not_kept_momentum_is_shown_and_where_it_came_from(hold):
+    """Force and effects together give what the body gained, to rounding; the force alone does not."""
+    axes = panels(solve(room(effects=[Shaken()]), steps=20, hold=hold))["ledger"]
+    assert "Momentum" in axes.get_title(loc="left")
+    curves = {curve.get_gid(): curve.get_ydata() for curve in axes.lines if curve.get_gid()}
     for axis in "xy":
-        assert curves[f"{axis} from force"] == pytest.approx(curves[f"{axis} gained"], abs=1e-3)
+        gained = curves[f"{axis} gained"]
+        assert curves[f"{axis} from force\nand effects"] == pytest.approx(gained, abs=1e-9)
+    assert np.abs(curves["x from the\nforce"] - curves["x gained"]).max() > 1e-3
+
+
+@pytest.mark.parametrize("hold", [False, True], ids=["nodal", "held"])
+def test_where_mass_burns_away_energy_per_mass_is_the_work(hold):
+    engine = Engine(0.15, exhaust_velocity=1.0, dry_mass=0.5)
+    scene = orbit(actuator=engine, objective=Fuel(), effects=[PointGravity(1), LinearDrag(0.01)])
+    solution = solve(scene, order=2, steps=200, hold=hold).raise_for_status()
+    axes = panels(solution)["ledger"]
+    assert "per mass" in axes.get_title(loc="left") and axes.get_ylabel() == "energy [J/kg]"
+    curves = {curve.get_label().replace("\n", " "): curve.get_ydata() for curve in axes.lines}
+    change = np.diff(0.5 * np.sum(solution.velocity[[0, -1]] ** 2, axis=1) - 1 / np.array([1.0, 1.2]))
+    assert curves["energy gained"][-1] == pytest.approx(change[0], abs=1e-9)
+    assert curves["sum of work"] == pytest.approx(curves["energy gained"], abs=1e-3)
+    assert curves["work of the effects"][-1] < 0 < curves["work of the force"][-1]
     assert "final mass" in figure(solution).get_suptitle()
+
+
+def test_a_loaded_engine_without_its_problem_shows_momentum(tmp_path):
+    engine = Engine(1.2, exhaust_velocity=100.0, dry_mass=5.0)
+    solve(room(actuator=engine, objective=Fuel(), constraints=()), steps=20, hold=True).save(tmp_path / "s.nc")
+    axes = panels(load(tmp_path / "s.nc"))["ledger"]
+    curves = {curve.get_gid(): curve.get_ydata() for curve in axes.lines if curve.get_gid()}
+    for axis in "xy":
+        assert curves[f"{axis} from the\nforce"] == pytest.approx(curves[f"{axis} gained"], abs=1e-3)
+
+
+def test_burns_are_marked_on_the_path_and_over_time():
+    thrust = {"actuator": Nozzles([(1,)], 3.0), "objective": Fuel(), "effects": [UniformGravity([-1.5])]}
+    lander = TransferProblem(1.0, State([10], [-2]), State([0], [0]), (0.5, 20.0), **thrust)
+    drawn = panels(solve(lander, steps=50))
+    for name in ("force", "speed", "ledger"):
+        (shade,) = [s for s in drawn[name].collections if s.get_gid() == "engine on"]
+        (times,) = [path.vertices[:, 0] for path in shade.get_paths()]
+        # the switch and the landing (Meditch 1964), to a step
+        assert (times.min(), times.max()) == pytest.approx((1.4154, 4.1641), abs=4.2 / 50)
+    assert "engine on" in labels(drawn["path"])
+    assert "engine on" not in labels(panels(solved("2-D order 8"))["path"])
+
+
+def test_an_approach_cone_is_drawn_from_its_tip_around_the_path():
+    for n, pieces in ((2, 2), (3, 5)):
+        start, goal = State((-50, *[5] * (n - 1)), [0] * n), State([0] * n, [0] * n)
+        cone = ApproachCone([0] * n, (-1, *[0] * (n - 1)), np.radians(20))
+        axes = panels(solve(TransferProblem(1.0, start, goal, 9.0, constraints=[cone]), steps=10))["path"]
+        edges = [np.array(a.get_data_3d() if n == 3 else a.get_data()) for a in axes.lines
+                 if a.get_label() == "approach cone"]  # fmt: skip
+        assert len(edges) == pieces and "approach cone" in labels(axes)
+        for edge in edges:
+            across = np.linalg.norm(edge[1:], axis=0)
+            assert across == pytest.approx(-np.tan(np.radians(20)) * edge[0], abs=1e-9)
+
+
+def test_an_attractor_whose_radius_is_known_is_drawn_in_its_size():
+    effects = [PointGravity(1), J2(1.0, 0.8, 1e-3)]
+    axes = panels(solve(orbit(effects=effects), steps=50))["path"]
+    (disc,) = [patch for patch in axes.patches if patch.get_gid() == "attractor"]
+    assert disc.center == (0.0, 0.0) and disc.radius == 0.8 and "attractor" in labels(axes)
+
+
+def test_both_bodies_of_the_three_body_problem_are_drawn_where_they_are_in_view():
+    still = (0.0, 0.0, 0.0)
+    across = TransferProblem(
+        1.0, State((0.2, 0.3, 0), still), State((1.2, 0.1, 0), still), 3.0, three_body(0.1)
+    )
+    axes = panels(solve(across, steps=50))["path"]
+    marks = [np.ravel(a.get_data_3d()) for a in axes.lines if a.get_label() == "attractor"]
+    assert np.array(marks) == pytest.approx(np.array([[-0.1, 0, 0], [0.9, 0, 0]]))
+
+
+def test_a_wide_room_has_a_wide_panel():
+    """Limits of a room are limits of the picture, and equal scales leave no empty half page."""
+    zones = [KeepIn((-1, -3), (40, 3)), KeepOut((20, 4), 3.0)]
+    corridor = TransferProblem(1.0, State((0, 0), (0, 0)), State((39, 0), (0, 0)), 9.0, constraints=zones)
+    page = figure(solve(corridor, steps=20))
+    page.draw_without_rendering()
+    boxes = [axes.get_position() for axes in page.axes]
+    assert boxes[0].width > 0.6 and all(box.y1 < boxes[0].y0 for box in boxes[1:])
+    assert max(np.abs(page.axes[0].get_ylim())) < 7
+
+
+def test_a_limit_far_above_the_force_does_not_flatten_its_curve():
+    solution = solve(orbit(actuator=BallForce(5.0)), steps=50)
+    axes = panels(solution)["force"]
+    assert not levels(axes, "limit") and "limit 5 N" in labels(axes)
+    assert axes.get_ylim()[1] < 3 * np.linalg.norm(solution.force, axis=1).max()
+
+
+def test_speeds_that_hardly_change_fill_their_panel():
+    assert panels(solved("1-D"))["speed"].get_ylim()[0] == 0
+    low, high = panels(solved("2-D order 8"))["speed"].get_ylim()
+    speed = np.linalg.norm(solved("2-D order 8").velocity, axis=1)
+    assert high - low < 1.5 * np.ptp(speed)
 
 
 def test_nozzles_are_limited_one_by_one():
