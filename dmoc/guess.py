@@ -70,7 +70,7 @@ def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
     squares = np.zeros(len(position))
     for attractor in attractors_of(problem):
         distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
-        squares += attractor.mu / np.maximum(distance, 1e-300) ** 3
+        squares += attractor.mu / np.maximum(distance, 1e-90) ** 3
     return np.sqrt(squares)
 
 
