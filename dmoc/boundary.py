@@ -11,8 +11,11 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number, same_length, vector
+from dmoc.checks import entries, number, same_length, short, vector
+from dmoc.effects.motion import as_column, tried
 from dmoc.rows import Row
+
+OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"
 
 
 class Boundary(ABC):
@@ -80,9 +83,9 @@ class State(Boundary):
         if position is None and velocity is None:
             raise ValueError("State: position and velocity are both None; fix at least one of them [m], [m/s]")
         if position is None:
-            position = (None,) * np.size(velocity)
+            position = (None,) * len(entries(velocity) or (velocity,))
         if velocity is None:
-            velocity = (None,) * np.size(position)
+            velocity = (None,) * len(entries(position) or (position,))
         object.__setattr__(self, "position", vector("position", position, "m", free=True))
         object.__setattr__(self, "velocity", vector("velocity", velocity, "m/s", free=True))
         same_length("State", position=self.position, velocity=self.velocity)
@@ -117,13 +120,17 @@ class Moving(Boundary):
     def __post_init__(self) -> None:
         if not callable(self.position):
             raise ValueError(
-                f"Moving: position must be a function of the time [s]; got {self.position!r}; "
+                f"Moving: position must be a function of the time [s]; got {short(self.position)}; "
                 "use State(position, velocity) for what does not move"
             )
-        if not (callable(self.velocity) or self.velocity in ("matched", None)):
+        word = self.velocity is None or (isinstance(self.velocity, str) and self.velocity == "matched")
+        if not (callable(self.velocity) or word):
             raise ValueError(
-                f"Moving: velocity must be a function of the time [s], 'matched' or None; got {self.velocity!r}"
+                f"Moving: velocity must be a function of the time [s], 'matched' or None; "
+                f"got {short(self.velocity)}"
             )
+        for name in ("position",) if word else ("position", "velocity"):
+            tried(f"Moving: {name}", getattr(self, name), [ca.SX.sym("t")], OF_TIME)
         sizes = [self._motion.numel_out(i) for i in range(self._motion.n_out())]
         if not 1 <= sizes[0] <= 3 or len(set(sizes)) > 1:
             raise ValueError(
@@ -135,10 +142,10 @@ class Moving(Boundary):
     def _motion(self) -> ca.Function:
         """t -> position [m] and, unless it is free, velocity [m/s]."""
         t = ca.SX.sym("t")
-        position = _column(self.position(t))
+        position = ca.SX(as_column(self.position(t)))
         if self.velocity is None:
             return ca.Function("motion", [t], [position])
-        moving = _column(self.velocity(t)) if callable(self.velocity) else ca.jacobian(position, t)
+        moving = as_column(self.velocity(t)) if callable(self.velocity) else ca.jacobian(position, t)
         return ca.Function("motion", [t], [position, ca.densify(moving)])
 
     @property
@@ -196,18 +203,18 @@ class Condition(Boundary):
 
     def __post_init__(self) -> None:
         if not callable(self.function):
-            raise ValueError(f"Condition: function must be a function (t, q, v, m); got {self.function!r}")
+            raise ValueError(f"Condition: function must be a function (t, q, v, m); got {short(self.function)}")
         if not isinstance(self.name, str) or not self.name:
-            raise ValueError(f"Condition: name must be a word; got {self.name!r}")
-        scale = self.scale
-        if np.ndim(scale) == 0:
-            checked: Any = number("scale", scale, "unit of the condition", positive=True)
+            raise ValueError(f"Condition: name must be a word; got {short(self.name)}")
+        scales = entries(self.scale)
+        if scales is None:
+            checked: Any = number("scale", self.scale, "unit of the condition", positive=True)
         else:
-            checked = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scale))  # type: ignore[arg-type]
+            checked = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scales))
         object.__setattr__(self, "scale", checked)
         if self.state is not None:
             if not isinstance(self.state, State):
-                raise ValueError(f"Condition: state must be a dmoc.State; got {self.state!r}")
+                raise ValueError(f"Condition: state must be a dmoc.State; got {short(self.state)}")
             self._check_values()
 
     @property
@@ -226,7 +233,7 @@ class Condition(Boundary):
         return super().fixed() if self.state is None else self.state.fixed()
 
     def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
-        values = _column(self.function(t, q, v, m))
+        values = as_column(self.function(t, q, v, m))
         count = values.numel()
         names = [self.name] if count == 1 else [f"{self.name}_{i + 1}" for i in range(count)]
         scales = np.broadcast_to(self.scale, (count,))
@@ -235,7 +242,8 @@ class Condition(Boundary):
     def _check_values(self) -> None:
         n = self.dimension
         given = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
-        count = _column(self.function(*given)).numel()
+        remedy = "it must take (t, q, v, m) as CasADi expressions and give one or a list of them"
+        count = tried(f"Condition {self.name!r}: function", self.function, list(given), remedy)
         if isinstance(self.scale, tuple) and len(self.scale) != count:
             raise ValueError(
                 f"Condition {self.name!r}: scale has {len(self.scale)} entries but the function gives {count} "
@@ -247,15 +255,6 @@ class Condition(Boundary):
         if self.state is None or np.isnan(self.state.fixed()).all():
             return condition
         return f"{self.state.words()}, {condition}"
-
-
-def _column(value: Any) -> Any:
-    """A CasADi column from what a user's function gave."""
-    if isinstance(value, (ca.SX, ca.MX, ca.DM)):
-        return ca.vec(value)
-    if isinstance(value, np.ndarray):
-        value = value.ravel().tolist()
-    return ca.SX(ca.vertcat(*value)) if isinstance(value, (list, tuple)) else ca.SX(value)
 
 
 def _entries(values: Any) -> str:

@@ -7,45 +7,72 @@ from typing import Any
 
 import numpy as np
 
+# Beyond these sizes [SI] squares and products overflow or vanish; nothing that moves comes near them.
+LARGEST, SMALLEST = 1e50, 1e-50
+
 
 def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative: bool = False) -> float:
     """`value` as a finite float, or a ValueError that names it."""
     try:
-        result = float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be one number{_in(unit)}; got {_short(value)}") from None
-    if isinstance(value, (bool, str)) or not math.isfinite(result):
-        raise ValueError(f"{name} must be a finite number{_in(unit)}; got {_short(value)}")
+        result = math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
+        several = np.ndim(value) > 0 if isinstance(value, np.ndarray) else False
+    except Exception:  # whatever a user's object raises
+        several = True
+    if several:
+        raise ValueError(f"{name} must be one number{_in(unit)}; got {short(value)}") from None
+    if not math.isfinite(result):
+        raise ValueError(f"{name} must be a finite number{_in(unit)}; got {short(value)}")
     if positive and result <= 0:
         raise ValueError(f"{name} must be greater than 0{_in(unit)}; got {result:g}")
     if nonnegative and result < 0:
         raise ValueError(f"{name} must not be negative{_in(unit)}; got {result:g}")
-    return result
+    if abs(result) > LARGEST or (positive and result < SMALLEST):
+        raise ValueError(
+            f"{name} must be of a size between {SMALLEST:g} and {LARGEST:g}{_in(unit)}; got {result:g}"
+        )
+    return result if abs(result) >= SMALLEST else 0.0
 
 
 def vector(name: str, value: Any, unit: str, free: bool = False) -> tuple:
     """`value` as a tuple of 1 to 3 finite floats; with free=True entries may be None."""
-    if isinstance(value, str):
-        raise ValueError(f"{name} must be 1 to 3 numbers{_in(unit)}; got {_short(value)}")
-    try:
-        entries = tuple(np.atleast_1d(np.asarray(value, dtype=object)))
-    except (TypeError, ValueError):
-        entries = ()
-    if not 1 <= len(entries) <= 3 or any(np.ndim(entry) for entry in entries):
-        raise ValueError(f"{name} must be 1 to 3 numbers{_in(unit)}; got {_short(value)}")
+    parts = entries(value)
+    parts = (value,) if parts is None else parts
+    several = 1 <= len(parts) <= 3 and not isinstance(value, (str, bytes))
+    if not several or any(entries(part) is not None for part in parts):
+        raise ValueError(f"{name} must be 1 to 3 numbers{_in(unit)}; got {short(value)}")
     return tuple(
-        None if free and entry is None else number(f"{name}[{i}]", entry, unit)
-        for i, entry in enumerate(entries)
+        None if free and part is None else number(f"{name}[{i}]", part, unit) for i, part in enumerate(parts)
     )
 
 
 def limits(name: str, value: Any, unit: str) -> float | tuple:
     """A positive number, or one positive number an axis."""
-    if np.ndim(value) == 0:
+    if entries(value) is None:
         return number(name, value, unit, positive=True)
     return tuple(
         number(f"{name}[{i}]", entry, unit, positive=True) for i, entry in enumerate(vector(name, value, unit))
     )
+
+
+def entries(value: Any) -> tuple | None:
+    """What a list, tuple, range or array holds; None of anything else."""
+    if isinstance(value, np.ndarray):
+        return tuple(value) if value.ndim else None
+    return tuple(value) if isinstance(value, (list, tuple, range)) else None
+
+
+def whole(name: str, value: Any, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`, or a ValueError that names it."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
+        raise ValueError(f"{name} must be a whole number of at least {least}; got {short(value)}")
+    return int(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value` as a bool, or a ValueError that names it."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False; got {short(value)}")
+    return bool(value)
 
 
 def same_length(owner: str, **vectors) -> None:
@@ -60,6 +87,7 @@ def _in(unit: str) -> str:
     return f" [{unit}]" if unit else ""
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
+def short(value: Any) -> str:
+    """`value` as it is written, on one line that is not too long."""
+    text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."

@@ -269,13 +269,20 @@ app.command("stability", epilog="Example: dmoc stability --revolutions 1000 --pl
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; every bad input becomes one line on stderr and exit code 2."""
+    from dmoc.library import users_line
+
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         code = app(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
         fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
     except (ValueError, OSError) as error:
-        fail(f"error: {error}", BAD_INPUT)
+        fail(f"error: {error}{users_line(error)}", BAD_INPUT)
+    except Exception as error:
+        place = users_line(error)
+        if not place:
+            raise
+        fail(f"error: {type(error).__name__}: {error}{place}", BAD_INPUT)
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number, same_length, vector
+from dmoc.checks import entries, number, same_length, short, vector
 from dmoc.rows import Row
 
 
@@ -93,10 +93,15 @@ class KeepIn(Constraint):
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
-            given = np.atleast_1d(np.asarray(getattr(self, name), dtype=object))
-            finite = [0.0 if value in (np.inf, -np.inf) else value for value in given]
-            vector(name, finite, "m")
-            object.__setattr__(self, name, tuple(float(value) for value in given))
+            value = getattr(self, name)
+            given = entries(value)
+            given = (value,) if given is None else given
+            endless = {
+                i for i, x in enumerate(given) if isinstance(x, (float, np.floating)) and abs(x) == np.inf
+            }
+            finite = vector(name, [0.0 if i in endless else x for i, x in enumerate(given)], "m")
+            corner = (float(given[i] if i in endless else x) for i, x in enumerate(finite))
+            object.__setattr__(self, name, tuple(corner))
         same_length("KeepIn", lower=self.lower, upper=self.upper)
         for low, high in zip(self.lower, self.upper, strict=True):
             if low >= high:
@@ -174,7 +179,9 @@ class ApproachCone(Constraint):
         same_length("ApproachCone", apex=apex, axis=axis)
         length = float(np.linalg.norm(axis))
         if len(axis) == 1 or length == 0:
-            raise ValueError(f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {self.axis!r}")
+            raise ValueError(
+                f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {short(self.axis)}"
+            )
         half_angle = number("half_angle", self.half_angle, "rad", positive=True)
         if half_angle >= np.pi / 2:
             raise ValueError(f"ApproachCone: half_angle must be less than pi/2 rad; got {half_angle:g}")

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.actuators import Actuator
-from dmoc.checks import limits, number, vector
+from dmoc.checks import entries, limits, number, short, vector
 from dmoc.rows import Row
 
 STANDARD_GRAVITY = 9.80665
@@ -164,12 +164,20 @@ class Nozzles(_Burner):
     dry_mass: float = 0.0
 
     def __post_init__(self) -> None:
-        rows = [vector(f"directions[{i}]", row, "-") for i, row in enumerate(self.directions)]
+        rows = [vector(f"directions[{i}]", row, "-") for i, row in enumerate(entries(self.directions) or ())]
         if not rows or len({len(row) for row in rows}) != 1 or not all(np.any(row) for row in rows):
-            raise ValueError(f"Nozzles: directions must be nonzero rows of one length; got {self.directions!r}")
+            raise ValueError(
+                f"Nozzles: directions must be nonzero rows of one length; got {short(self.directions)}"
+            )
         unit = tuple(tuple(float(x) for x in np.array(row) / np.linalg.norm(row)) for row in rows)
         object.__setattr__(self, "directions", unit)
-        thrusts = np.broadcast_to(np.atleast_1d(np.asarray(self.max_thrust, dtype=object)), (len(rows),))
+        given = entries(self.max_thrust)
+        thrusts = (self.max_thrust,) * len(rows) if given is None else given
+        if len(thrusts) != len(rows):
+            raise ValueError(
+                f"Nozzles: max_thrust has {len(thrusts)} entries but there are {len(rows)} directions; "
+                f"give one number [N] or {len(rows)}"
+            )
         checked = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
         object.__setattr__(self, "max_thrust", checked)
         self._check_exhaust(self.specific_impulse)

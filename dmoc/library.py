@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from dmoc.problem import TransferProblem
 
 FUNCTION = "problem"
+# What the modules of problem files are called, before the file's own name.
+MODULE = "dmoc_problem_"
 
 
 @dataclass(frozen=True)
@@ -196,7 +198,7 @@ def _summary(path: Path) -> str:
 
 def _run(path: Path, source: bytes) -> ModuleType:
     # Dataclasses and pickle look a class's module up by name, so it has to be there.
-    module = ModuleType(f"dmoc_problem_{path.stem}")
+    module = ModuleType(f"{MODULE}{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
     linecache.checkcache(str(path))
@@ -213,6 +215,19 @@ def _guarded(path: Path, call: Callable[[], Any]) -> Any:
         where = f"{path}, line {number} ({text})" if text else f"{path}, line {number}"
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise ValueError(f"{where}: {kind}{_one_line(error)}") from error
+
+
+def users_line(error: BaseException) -> str:
+    """Where in a problem file an exception of a solve comes from, ` (FILE, line N: TEXT)`; else nothing."""
+    begun: BaseException | None = error
+    while begun is not None:
+        for frame in reversed(traceback.extract_tb(begun.__traceback__)):
+            module = sys.modules.get(f"{MODULE}{Path(frame.filename).stem}")
+            known = module is not None and module.__file__ == frame.filename
+            if known and frame.filename not in str(error):
+                return f" ({frame.filename}, line {frame.lineno}: {frame.line})"
+        begun = begun.__cause__
+    return ""
 
 
 def _user_line(path: Path, error: BaseException) -> tuple[int, str]:

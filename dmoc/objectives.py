@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from dmoc.actuators import Actuator
-from dmoc.checks import number, vector
+from dmoc.checks import entries, number, short, vector, whole
 
 
 class Objective(ABC):
@@ -45,9 +45,13 @@ class Objective(ABC):
     __rmul__ = __mul__
 
     def __add__(self, other: Objective) -> WeightedSum:
+        if not isinstance(other, Objective):
+            raise ValueError(f"only objectives can be added to an objective; got {short(other)}")
         return WeightedSum((*self.terms, *other.terms))
 
     def __sub__(self, other: Objective) -> WeightedSum:
+        if not isinstance(other, Objective):
+            raise ValueError(f"only objectives can be taken away from an objective; got {short(other)}")
         return WeightedSum((*self.terms, *(-1.0 * other).terms))
 
     def check_dimension(self, dimension: int) -> None:
@@ -163,9 +167,12 @@ class FinalHeight(Objective):
     unit: ClassVar[str] = "m"
     sense: ClassVar[int] = -1
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", whole("FinalHeight: axis", self.axis, least=-3))
+
     def check_dimension(self, dimension: int) -> None:
-        if isinstance(self.axis, bool) or self.axis not in range(-dimension, dimension):
-            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {self.axis!r}")
+        if self.axis not in range(-dimension, dimension):
+            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {short(self.axis)}")
 
     def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return q[self.axis]
@@ -185,6 +192,11 @@ class WeightedSum(Objective):
     parts: tuple[tuple[float, Objective], ...]
 
     def __post_init__(self) -> None:
+        pairs = [entries(part) or () for part in entries(self.parts) or ()]
+        if not pairs or any(len(pair) != 2 or not isinstance(pair[1], Objective) for pair in pairs):
+            raise ValueError(f"WeightedSum: parts must be pairs (weight, objective); got {short(self.parts)}")
+        parts = tuple((number("weight", weight, ""), term) for weight, term in pairs)
+        object.__setattr__(self, "parts", parts)
         pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
         if len(pulls) > 1:
             raise ValueError(

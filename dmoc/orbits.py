@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.boundary import Boundary
-from dmoc.checks import number, vector
+from dmoc.checks import flag, number, vector
 from dmoc.elements import ELEMENTS, element_rows, nearest_state, plane_elements
 from dmoc.rows import Row
 
@@ -91,6 +91,7 @@ class CircularOrbit(_Around):
                 raise ValueError(f"CircularOrbit: normal must be a direction in space; got {self.normal!r}")
             object.__setattr__(self, "normal", tuple(x / length for x in normal))
         self._check_attractor(spatial=self.normal is not None)
+        object.__setattr__(self, "clockwise", flag("CircularOrbit: clockwise", self.clockwise))
         if self.clockwise and self.dimension == 3:
             raise ValueError("CircularOrbit: clockwise has no meaning in space; give normal=(0, 0, -1)")
 

@@ -6,14 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.actuators import Actuator, FreeForce
 from dmoc.boundary import Boundary
-from dmoc.checks import number
+from dmoc.checks import entries, number, short
 from dmoc.constraints import Constraint
-from dmoc.effects.base import Effect
+from dmoc.effects.base import Conservative, Effect
+from dmoc.effects.motion import evaluated
 from dmoc.objectives import Effort, FinalMass, Objective, Time
+from dmoc.rows import Row
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class TransferProblem:
             ("objective", Objective),
         ):
             if not isinstance(getattr(self, name), kind):
-                raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {getattr(self, name)!r}")
+                raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
         self._complete_ends()
         if self.objective.metered:
             object.__setattr__(self, "actuator", self.actuator.metered(self.dimension))
@@ -87,6 +90,8 @@ class TransferProblem:
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
         for part in parts:
             part.check_dimension(self.dimension)
+        self._check_clock()
+        _check_functions(self)
         self._check_objective()
         self._check_ends()
         if self.actuator.dry_mass >= self.mass:
@@ -104,6 +109,11 @@ class TransferProblem:
     def adjustable_parts(self) -> tuple:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
         return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+
+    @property
+    def limited(self) -> bool:
+        """Whether there are inequalities: limits of the actuator or constraints."""
+        return bool(self.constraints) or self.actuator.force_limit() is not None
 
     @property
     def free_duration(self) -> bool:
@@ -125,6 +135,15 @@ class TransferProblem:
             )
         for end in ("start", "goal"):
             object.__setattr__(self, end, getattr(self, end).with_dimension(dimension))
+
+    def _check_clock(self) -> None:
+        """Times of a transfer must differ by more than the rounding of the clock."""
+        shortest = self.duration_bounds[0]
+        if shortest < 1e4 * np.spacing(abs(self.start_time)):
+            raise ValueError(
+                f"start_time {self.start_time:g} s is too late to tell times within {shortest:g} s apart; "
+                "count time from nearer"
+            )
 
     def _check_ends(self) -> None:
         """A boundary state that breaks a constraint can never be met, whatever the path."""
@@ -164,13 +183,46 @@ class TransferProblem:
             )
 
 
+def _check_functions(problem: TransferProblem) -> None:
+    """What parts of the user's own give has to have the right number of entries."""
+    n, actuator = problem.dimension, problem.actuator
+    t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
+    u = ca.SX.sym("u", actuator.size(n))
+    functions: list[tuple[Any, str, list, int]] = [(actuator, "force", [u], n)]
+    for effect in problem.effects:
+        single = isinstance(effect, Conservative)
+        functions.append((effect, "lagrangian" if single else "force", [t, q, v, m], 1 if single else n))
+    for _, term in problem.objective.terms:
+        functions += [(term, "running", [t, q, v, u, m], 1), (term, "terminal", [t, q, v, m], 1)]
+    for part, name, given, needed in functions:
+        if _is_users(part):
+            words, method = f"{type(part).__name__}.{name}", getattr(part, name)
+            found = evaluated(words, method, given, "write it with casadi's functions").numel()
+            if found != needed:
+                raise ValueError(f"{words} must give {needed} values in {n} dimensions; it gives {found}")
+    limits: list[tuple[Any, str, list]] = [(actuator, "rows", [u])]
+    for constraint in problem.constraints:
+        limits += [(constraint, "rows", [t, q, u, m]), (constraint, "speed_rows", [v])]
+    for part, name, given in limits:
+        rows = getattr(part, name)(*given) if _is_users(part) else []
+        if not isinstance(rows, (list, tuple)) or not all(isinstance(row, Row) for row in rows):
+            raise ValueError(
+                f"{type(part).__name__}.{name} must give a list of dmoc.Row; it gives {short(rows)}"
+            )
+
+
+def _is_users(part: Any) -> bool:
+    return not type(part).__module__.startswith("dmoc.")
+
+
 def _duration(value: Any) -> float | tuple[float, float]:
-    if np.ndim(value) == 0:
+    ends = entries(value)
+    if ends is None:
         return number("duration", value, "s", positive=True)
-    if len(value) != 2:
-        raise ValueError(f"duration must be one number or (shortest, longest) [s]; got {value!r}")
-    shortest = number("duration's shortest", value[0], "s", positive=True)
-    longest = number("duration's longest", value[1], "s", positive=True)
+    if len(ends) != 2:
+        raise ValueError(f"duration must be one number or (shortest, longest) [s]; got {short(value)}")
+    shortest = number("duration's shortest", ends[0], "s", positive=True)
+    longest = number("duration's longest", ends[1], "s", positive=True)
     if shortest >= longest:
         raise ValueError(
             f"duration's shortest must be less than its longest; got {shortest:g} and {longest:g} s"
@@ -181,8 +233,8 @@ def _duration(value: Any) -> float | tuple[float, float]:
 def _parts(name: str, value: Any, kind: type) -> tuple:
     parts = (value,) if isinstance(value, kind) else value
     if isinstance(parts, str) or not isinstance(parts, Sequence):
-        raise ValueError(f"{name} must be a sequence of dmoc.{kind.__name__}; got {value!r}")
+        raise ValueError(f"{name} must be a sequence of dmoc.{kind.__name__}; got {short(value)}")
     for part in parts:
         if not isinstance(part, kind):
-            raise ValueError(f"{name} must hold only dmoc.{kind.__name__} objects; got {part!r}")
+            raise ValueError(f"{name} must hold only dmoc.{kind.__name__} objects; got {short(part)}")
     return tuple(parts)

@@ -49,10 +49,10 @@ MAY_IMPORT = {
     "engines": "actuators checks rows",
     "objectives": "actuators checks",
     "constraints": "checks rows",
-    "boundary": "checks rows",
+    "boundary": "checks effects.motion rows",
     "elements": "rows",
     "orbits": "boundary checks elements rows",
-    "problem": "actuators boundary checks constraints effects.base objectives",
+    "problem": "actuators boundary checks constraints effects.base effects.motion objectives rows",
     # the discrete equations, which know nothing of a transfer
     "mechanics": "actuators effects.base kept lobatto",
     "mesh": "lobatto",

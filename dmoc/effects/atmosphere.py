@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.checks import number, vector
+from dmoc.checks import number, short, vector
 from dmoc.effects.base import Force, Part, need_dimension
 from dmoc.effects.motion import as_column, tried
 
@@ -193,7 +193,7 @@ class Drag(Force):
         )
         if not isinstance(self.atmosphere, Atmosphere):
             raise ValueError(
-                f"atmosphere must be a dmoc.Atmosphere; got {self.atmosphere!r}: for one density [kg/m^3] "
+                f"atmosphere must be a dmoc.Atmosphere; got {short(self.atmosphere)}: for one density [kg/m^3] "
                 "everywhere give UniformAtmosphere(density)"
             )
 

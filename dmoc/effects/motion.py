@@ -221,7 +221,7 @@ class TabulatedMotion(Part):
     def __post_init__(self) -> None:
         try:
             times, positions = np.asarray(self.times, float), np.asarray(self.positions, float)
-        except (TypeError, ValueError):
+        except Exception:  # whatever a user's objects raise
             raise ValueError("times and positions must be numbers [s], [m]") from None
         if times.ndim != 1 or len(times) < 4 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError(
@@ -266,16 +266,25 @@ def given_motion(owner: str, name: str, value: Any) -> Any:
 
 def tried(name: str, function: Any, symbols: list, remedy: str) -> int:
     """How many entries a user's function of CasADi symbols gives; ValueError if it fails or gives NaN."""
-    try:
-        column = as_column(function(*symbols))
-        probe = ca.Function("probe", symbols, [ca.densify(ca.sum1(column))])
-    except Exception as error:
-        raise ValueError(f"{name} fails ({' '.join(str(error).split())[:120]}); {remedy}") from error
+    column = evaluated(name, function, symbols, remedy)
+    probe = ca.Function("probe", symbols, [ca.densify(ca.sum1(column))])
     # Python's own math turns a symbol into NaN without a word; a good function may be undefined somewhere
     places = [0.0, 0.37, 1.0, 1e3, 1e6]
     if all(np.isnan(float(probe(*[x] * len(symbols)))) for x in places):
         raise ValueError(f"{name} gives no number; {remedy}")
     return column.numel()
+
+
+def evaluated(name: str, function: Any, symbols: list, remedy: str) -> Any:
+    """The column that a user's function of CasADi symbols gives; ValueError if it fails or gives none."""
+    try:
+        column = as_column(function(*symbols))
+        ca.Function("probe", symbols, [column])
+    except Exception as error:
+        raise ValueError(f"{name} fails ({' '.join(str(error).split())[:120]}); {remedy}") from error
+    if not column.numel():
+        raise ValueError(f"{name} gives nothing; {remedy}")
+    return column
 
 
 def position_at(motion: Any, t: Any, dimension: int) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number
+from dmoc.checks import number, short
 from dmoc.effects.base import Force, Part, need_dimension
 from dmoc.effects.motion import given_motion, position_at
 
@@ -143,7 +143,8 @@ class RadiationPressure(Force):
         object.__setattr__(self, "sun", given_motion("RadiationPressure", "sun", self.sun))
         if self.shadow is not None and not isinstance(self.shadow, Shadow):
             raise ValueError(
-                f"shadow must be a dmoc.Shadow such as CylindricalShadow(radius) or None; got {self.shadow!r}"
+                "shadow must be a dmoc.Shadow such as CylindricalShadow(radius) or None; "
+                f"got {short(self.shadow)}"
             )
         self._check_distance()
 
