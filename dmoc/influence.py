@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from dmoc.blocks import Transcript
+from dmoc.docstrings import documented
 from dmoc.effects import (
     J2,
     ConicalShadow,
@@ -20,6 +20,7 @@ from dmoc.effects import (
     ThirdBody,
     circular_motion,
 )
+from dmoc.formulas import formulas_of
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, state_symbols
 from dmoc.mesh import Guess
@@ -29,7 +30,7 @@ from dmoc.simulation import end_momenta
 from dmoc.solution import Solution
 from dmoc.transcription import transcribe_onto, units_of
 
-REPEATS = 15
+REPEATS = 25
 EARTH_MU, EARTH_RADIUS, EARTH_RATE = 3.986004418e14, 6.378137e6, 7.2921159e-5
 SUN_DISTANCE, SUN_RATE = 1.495978707e11, 1.99098e-7
 
@@ -41,6 +42,8 @@ class Influence:
     Attributes
     ----------
     effect : Effect
+    name : str
+        Its kind and numbers; what stands for it, such as the Moon, where the library chose them.
     listed : bool
         Whether the scene has it; otherwise the figures are what it would do.
     acceleration : float
@@ -54,6 +57,7 @@ class Influence:
     """
 
     effect: Effect
+    name: str
     listed: bool
     acceleration: float
     displacement: float
@@ -68,51 +72,62 @@ def influences(solution: Solution, others: bool = False) -> list[Influence]:
     and sunlight on 0.01 m^2 a kg.
     """
     problem, path = solution.require_problem(), solution.path
-    found = [_one(problem, path, effect, listed=True) for effect in problem.effects]
-    missing = candidates(problem) if others else []
-    return found + [_one(problem, path, effect, listed=False) for effect in missing]
+    found = [_one(problem, path, effect, _name(effect), listed=True) for effect in problem.effects]
+    missing = candidates(problem) if others else {}
+    return found + [_one(problem, path, effect, name, listed=False) for name, effect in missing.items()]
 
 
-def candidates(problem: TransferProblem) -> list[Effect]:
-    """Effects of the library that could apply to a scene around the Earth and are not in it."""
+def candidates(problem: TransferProblem) -> dict[str, Effect]:
+    """Effects of the library that could apply to a scene around the Earth and are not in it, by name."""
     masses = [effect.mu for effect in problem.effects if isinstance(effect, PointGravity)]
     if not any(abs(mu / EARTH_MU - 1) < 0.01 for mu in masses) or problem.dimension == 1:
-        return []
+        return {}
     sun = circular_motion(SUN_DISTANCE, SUN_RATE)
     area = 0.01 * problem.mass
     air = ExponentialAtmosphere(3.725e-12, 4e5, 5.8515e4, EARTH_RADIUS, EARTH_RATE)
-    library: list[Effect] = [
-        J2(EARTH_MU, EARTH_RADIUS, 1.08263e-3),
-        ThirdBody(4.9048695e12, circular_motion(3.844e8, 2.66170e-6)),
-        ThirdBody(1.32712440018e20, sun),
-        Drag(area, 2.2, air),
-        RadiationPressure(area, 0.3, sun, ConicalShadow(EARTH_RADIUS)),
-    ]
+    library: dict[str, Effect] = {
+        "J2": J2(EARTH_MU, EARTH_RADIUS, 1.08263e-3),
+        "ThirdBody, the Moon": ThirdBody(4.9048695e12, circular_motion(3.844e8, 2.66170e-6)),
+        "ThirdBody, the Sun": ThirdBody(1.32712440018e20, sun),
+        f"Drag, area {area:.4g} m^2": Drag(area, 2.2, air),
+        f"RadiationPressure, area {area:.4g} m^2": RadiationPressure(
+            area, 0.3, sun, ConicalShadow(EARTH_RADIUS)
+        ),
+    }
     present = {type(effect) for effect in problem.effects}
-    return [effect for effect in library if type(effect) not in present]
+    return {name: effect for name, effect in library.items() if type(effect) not in present}
 
 
-def _one(problem: TransferProblem, path: Guess, effect: Effect, listed: bool) -> Influence:
+def _name(effect: Effect) -> str:
+    """The effect's kind and those of its parameters that are numbers."""
+    known = documented(type(effect).__doc__)
+    words = [type(effect).__name__]
+    members: tuple = fields(effect) if is_dataclass(effect) else ()
+    for member in members:
+        if isinstance(value := getattr(effect, member.name), (int, float)):
+            unit = known[member.name].unit if member.name in known else ""
+            words.append(f"{member.name} {value:.4g} {unit}".rstrip(" -"))
+    return ", ".join(words)
+
+
+def _one(problem: TransferProblem, path: Guess, effect: Effect, name: str, listed: bool) -> Influence:
     alone = tuple(other for other in problem.effects if other is not effect)
     without = replace(problem, effects=alone)
     scene = problem if listed else replace(problem, effects=(*problem.effects, effect))
     ends = [
-        reference(_dynamics(case), path, case.start_time, path.start_velocity)[0] for case in (scene, without)
+        reference(Dynamics.of(case), path, case.start_time, path.start_velocity)[0] for case in (scene, without)
     ]
-    more, less = _instructions(scene, path), _instructions(without, path)
-    slow, fast = _seconds(scene, path), _seconds(without, path)
+    more, less = (_instructions(case, path) for case in (scene, without))
+    slow, fast = _seconds(path, scene, without)
     return Influence(
         effect,
+        name,
         listed,
         _largest_acceleration(problem, path, effect),
         float(np.linalg.norm(ends[0] - ends[1])),
         more - less,
         max(0.0, 1 - fast / slow),
     )
-
-
-def _dynamics(problem: TransferProblem) -> Dynamics:
-    return Dynamics.of(problem)
 
 
 def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect) -> float:
@@ -124,27 +139,28 @@ def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect)
     function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
     ends = slice(None, None, scheme(path.order).degree)
     times = problem.start_time + path.duration * path.mesh
-    _, velocity = end_momenta(_dynamics(problem), path, problem.start_time)
+    _, velocity = end_momenta(Dynamics.of(problem), path, problem.start_time)
     pulls = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
     return float(np.linalg.norm(pulls, axis=0).max())
 
 
 def _instructions(problem: TransferProblem, path: Guess) -> int:
-    """Instructions of one evaluation of each block with its derivatives."""
-    script = Transcript(problem, scheme(path.order), path.hold, path.mesh, units_of(problem, path))
-    kernels = [block.kernel for block in script.blocks]
+    """Instructions of one evaluation of node, step and ends with their derivatives."""
+    kernels = [stencil.kernel for stencil in formulas_of(problem, path.order, path.hold).stencils]
     return sum(part.n_instructions() for kernel in kernels for part in kernel.functions.values())
 
 
-def _seconds(problem: TransferProblem, path: Guess) -> float:
-    """Median time to evaluate Jacobian and Hessian on the whole mesh [s]."""
-    nlp = transcribe_onto(problem, path, units_of(problem, path))
-    x, p = nlp.pack(path), nlp.parameters(problem)
-    multipliers = np.ones(nlp.rows.size)
-    taken = []
-    for _ in range(REPEATS):
-        begun = time.perf_counter()
-        nlp.assembly.jacobian(x, p)
-        nlp.assembly.hessian(x, p, 1.0, multipliers)
-        taken.append(time.perf_counter() - begun)
-    return float(np.median(taken))
+def _seconds(path: Guess, *problems: TransferProblem) -> np.ndarray:
+    """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s]; they take turns."""
+    taken = np.empty((REPEATS, len(problems)))
+    cases = []
+    for problem in problems:
+        nlp = transcribe_onto(problem, path, units_of(problem, path))
+        cases.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
+    for turn in taken:
+        for i, (assembly, x, p, multipliers) in enumerate(cases):
+            begun = time.perf_counter()
+            assembly.jacobian(x, p)
+            assembly.hessian(x, p, 1.0, multipliers)
+            turn[i] = time.perf_counter() - begun
+    return taken.min(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rich import box
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -13,39 +14,51 @@ from dmoc.report import pairs
 
 if TYPE_CHECKING:
     from dmoc.doctor import Findings
-    from dmoc.effects.base import Effect
     from dmoc.influence import Influence
     from dmoc.solution import Solution
     from dmoc.starts import Optimum
 
 
 def influence_table(rows: Sequence[Influence], solution: Solution) -> RenderableType:
-    """One row an effect, and a line that says how to read them."""
-    table = Table(box=None, header_style="bold", pad_edge=False)
+    """One row an effect, those of the scene above those that are not in it, and how to read them."""
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False)
     table.add_column("effect", overflow="fold")
-    table.add_column("in the scene")
-    for name in ("largest acceleration [m/s^2]", "goal moves without it [m]", "instructions", "time share"):
+    for name in (
+        "largest\nacceleration",
+        "goal moves\nwithout it",
+        "instructions\nit adds",
+        "share of\nthe time",
+    ):
         table.add_column(name, justify="right")
-    for row in rows:
+    for row, following in zip(rows, [*rows[1:], None], strict=True):
         table.add_row(
-            _name(row.effect),
-            "yes" if row.listed else "no",
-            f"{row.acceleration:.3g}",
-            f"{row.displacement:.3g}",
-            f"{row.instructions:+d}",
+            row.name if row.listed else f"({row.name})",
+            f"{row.acceleration:.2e} m/s\u00b2",
+            _length(row.displacement),
+            f"{row.instructions:,}",
             f"{100 * row.time_share:.0f} %",
+            style=None if row.listed else "dim",
+            end_section=following is not None and following.listed != row.listed,
         )
     note = (
         f"Along the solved path of {solution.provenance.problem_name} (order {solution.order}, "
-        f"{solution.steps} steps). 'Goal moves' compares the independent integrator flying the same controls "
-        "with the effect and without it; for an effect not in the scene, with it added."
+        f"{solution.steps} steps). The goal moves between two flights of the same controls by an independent "
+        "integrator, with the effect and without it. Time is that of all derivatives on the whole mesh."
     )
-    return Group(table, Text(""), Text(note))
+    if not all(row.listed for row in rows):
+        note += " Effects in brackets are not in the scene: what they would do and cost."
+    return Group(table, Text(note))
 
 
-def _name(effect: Effect) -> str:
-    """The effect's name and numbers, without its description."""
-    return effect.words().split("(", 1)[-1].removesuffix(")")
+def _length(metres: float) -> str:
+    kilometres = metres / 1e3
+    return (
+        f"{kilometres:,.0f} km"
+        if metres >= 1e5
+        else f"{kilometres:.3g} km"
+        if metres >= 1e3
+        else f"{metres:.3g} m"
+    )
 
 
 def optima_table(found: Sequence[Optimum], unit: str) -> RenderableType:

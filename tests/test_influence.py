@@ -1,5 +1,8 @@
 """What an effect is said to do is what it does: held to closed forms."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -37,4 +40,18 @@ def test_around_the_earth_the_library_offers_what_is_missing():
     assert oblateness.acceleration == pytest.approx(
         1.5 * EARTH_MU * 1.08263e-3 * 6.378137e6**2 / radius**4, rel=1e-3
     )
-    assert candidates(TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0)) == []
+    assert not candidates(TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0))
+    assert "ThirdBody, the Moon" in [row.name for row in rows]
+
+
+def test_every_further_effect_costs_more_and_none_costs_least():
+    """The scenes of scripts/effects_cost.py: the same transfer with no effect, one, two, ..."""
+    script = runpy.run_path(str(Path(__file__).parents[1] / "scripts" / "effects_cost.py"))
+    scenes = script["scenes"]()
+    assert list(scenes)[:4] == ["none", "PointGravity", "+ J2", "+ Drag"]
+    counts = [script["instructions"](scene, 2) for scene in scenes.values()]
+    for name in script["FUNCTIONS"]:
+        found = [count[name] for count in counts]
+        assert found == sorted(set(found))
+    for scene in list(scenes.values())[:4]:
+        assert solve(scene, order=8, steps=40).raise_for_status().iterations < 10
