@@ -61,11 +61,21 @@ def entries(value: Any) -> tuple | None:
     return tuple(value) if isinstance(value, (list, tuple, range)) else None
 
 
-def whole(name: str, value: Any, least: int = 1) -> int:
+def whole(name: str, value: Any, least: int = 1, most: int | None = None) -> int:
     """`value` as a whole number of at least `least`, or a ValueError that names it."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}; got {short(value)}")
+    if most is not None and value > most:
+        raise ValueError(f"{name} must be at most {most:,}; got {short(value)}")
     return int(value)
+
+
+def of_kind(name: str, value: Any, kind: type) -> Any:
+    """`value` itself, or a ValueError that says what it should be."""
+    if not isinstance(value, kind):
+        home = "dmoc." if kind.__module__.startswith("dmoc.") else ""
+        raise ValueError(f"{name} must be a {home}{kind.__name__}; got {short(value)}")
+    return value
 
 
 def flag(name: str, value: Any) -> bool:

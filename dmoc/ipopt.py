@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.checks import short
 from dmoc.mesh import Guess, node_weights
 from dmoc.problem import TransferProblem
 from dmoc.transcription import NLP
@@ -97,7 +98,15 @@ def make_solver(
     if watch is not None:
         settings["iteration_callback"] = watch
     settings |= options or {}
-    return ca.nlpsol("solver", "ipopt", {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}, settings)
+    try:
+        return ca.nlpsol("solver", "ipopt", {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}, settings)
+    except RuntimeError as error:
+        if not options:
+            raise
+        raise ValueError(
+            f"CasADi or Ipopt refuses one of the options {short(options)}: its name or its value; "
+            "names are such as 'ipopt.max_iter'"
+        ) from error
 
 
 def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -> Answer:

@@ -8,6 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import legendre
 
+from dmoc.checks import short
+
 ORDERS = (2, 4, 6, 8)
 
 
@@ -64,7 +66,6 @@ class Scheme:
         return 0.5 * (legendre.leggauss(self.degree)[0] + 1)
 
 
-@lru_cache
 def scheme(order: int) -> Scheme:
     """The scheme of order 2, 4, 6 or 8.
 
@@ -73,9 +74,13 @@ def scheme(order: int) -> Scheme:
     ValueError
         If there is no such order.
     """
-    if order not in ORDERS:
-        raise ValueError(f"order must be one of 2, 4, 6, 8; got {order!r}")
-    degree = order // 2
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order not in ORDERS:
+        raise ValueError(f"order must be one of 2, 4, 6, 8; got {short(order)}")
+    return _scheme(int(order) // 2)
+
+
+@lru_cache
+def _scheme(degree: int) -> Scheme:
     points = _lobatto_points(degree)
     at_points = legendre.Legendre.basis(degree)(2 * points - 1)
     weights = 1 / (degree * (degree + 1) * at_points**2)

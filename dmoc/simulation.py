@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number
+from dmoc.checks import flag, number, of_kind, short, whole
 from dmoc.kept import kept
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map, step_momenta
@@ -142,6 +142,8 @@ def simulate(
     ValueError
         If the start is not fixed, or the controls do not fit the mesh.
     """
+    of_kind("problem", problem, TransferProblem)
+    hold, compensated = flag("hold", hold), flag("compensated", compensated)
     dynamics = Dynamics.of(problem)
     position, velocity = problem.start.fixed()
     if np.isnan(position).any() or np.isnan(velocity).any():
@@ -168,12 +170,13 @@ def _given_path(
     problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
 ) -> Guess:
     """Controls on a mesh, checked, as a path that stays at the start."""
-    if steps is not None and (isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1):
-        raise ValueError(f"steps must be a whole number of at least 1; got {steps!r}")
-    mesh = uniform_mesh(400 if steps is None else int(steps))
+    mesh = uniform_mesh(400 if steps is None else whole("steps", steps))
     nodes = len(node_fractions(mesh, scheme(order)))
     shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
-    given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+    try:
+        given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+    except Exception:  # whatever a user's object raises
+        raise ValueError(f"controls must be a Solution or an array of numbers; got {short(controls)}") from None
     if given.shape != shape:
         raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
     if not np.isfinite(given).all():

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.checks import of_kind
 from dmoc.mesh import Guess
 from dmoc.problem import TransferProblem
 
@@ -28,6 +29,7 @@ class Level:
     solve_s: float
     status: str
     error: float | None = None
+    evaluations: int = 0
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,11 @@ class Solution:
         return sum(level.iterations for level in self.ladder)
 
     @property
+    def evaluations(self) -> int:
+        """Evaluations of functions and derivatives on all meshes."""
+        return sum(level.evaluations for level in self.ladder)
+
+    @property
     def build_s(self) -> float:
         """Seconds spent on building NLPs."""
         return sum(level.build_s for level in self.ladder)
@@ -237,6 +244,7 @@ class Solution:
         ValueError
             If the problem has another dimension, number of controls or start time than the solution.
         """
+        of_kind("problem", problem, TransferProblem)
         facts = (
             ("dimension", self.dimension, problem.dimension, ""),
             ("number of controls", self.path.control.shape[1], problem.actuator.size(problem.dimension), ""),

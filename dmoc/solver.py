@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.checks import number
+from dmoc.checks import flag, number, of_kind, short, whole
 from dmoc.climb import Climb
 from dmoc.guess import graded_guess, is_uneven, starting_guess
 from dmoc.ipopt import Progress, scaled_multipliers
@@ -66,7 +66,15 @@ def solve(
     ValueError
         If an argument has no meaning for this problem.
     """
+    of_kind("problem", problem, TransferProblem)
     scheme(2 if order is None else order)
+    hold = flag("hold", hold)
+    if options is not None and not all(isinstance(name, str) for name in of_kind("options", options, dict)):
+        raise ValueError(f"options must have names such as 'ipopt.max_iter'; got {short(options)}")
+    if steps is not None:
+        whole("steps", steps, least=2)
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress must be a function; got {short(progress)}")
     climb = Climb(problem, options, progress)
     if tol is not None:
         if mesh is not None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.assembly import Assembly, assemble
 from dmoc.blocks import Transcript
+from dmoc.checks import entries, flag, number, of_kind, short, whole
 from dmoc.guess import starting_guess
 from dmoc.layout import Layout
 from dmoc.lobatto import Scheme, scheme
@@ -17,6 +18,9 @@ from dmoc.mechanics import Dynamics, state_symbols
 from dmoc.mesh import Guess, node_weights, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.rows import values_of
+
+# More would not fit into the memory of any computer of today.
+MOST_STEPS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -183,7 +187,8 @@ def transcribe(
     ValueError
         If the mesh has fewer than 2 steps or does not increase from 0 to 1.
     """
-    start = starting_guess(problem, check_mesh(steps, mesh), order, hold, guess)
+    of_kind("problem", problem, TransferProblem)
+    start = starting_guess(problem, check_mesh(steps, mesh), order, flag("hold", hold), guess)
     return transcribe_onto(problem, start, units_of(problem, start))
 
 
@@ -211,12 +216,10 @@ def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units) -> NLP
 def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:
     """Step ends as fractions, from a number of steps or as given."""
     if mesh is None:
-        if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 2:
-            raise ValueError(f"steps must be a whole number of at least 2; got {steps!r}")
-        return uniform_mesh(int(steps))
-    ends = np.asarray(mesh, float)
+        return uniform_mesh(whole("steps", steps, least=2, most=MOST_STEPS))
+    ends = np.array([number("mesh", end, "-") for end in entries(mesh) or ()])
     if ends.ndim != 1 or len(ends) < 3 or ends[0] != 0 or ends[-1] != 1 or not (np.diff(ends) > 0).all():
-        raise ValueError(f"mesh must be at least 3 increasing fractions from 0 to 1; got {mesh!r}")
+        raise ValueError(f"mesh must be at least 3 increasing fractions from 0 to 1; got {short(mesh)}")
     return ends
 
 

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.case import ROUNDING, Case
+from dmoc.checks import of_kind
 from dmoc.limits import excesses
 from dmoc.mechanics import specific_lagrangian, state_symbols
 from dmoc.optimality import stationarity
@@ -83,6 +84,7 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
     ValueError
         If the solution has no problem and none is given, or one that does not fit it.
     """
+    of_kind("solution", solution, Solution)
     if problem is not None:
         solution = solution.attach(problem)
     begun = time.perf_counter()

@@ -347,7 +347,7 @@ def test_an_interrupt_exits_130(folder, seconds):
     kill = f"import os, threading; threading.Timer({seconds}, os.kill, (os.getpid(), 2)).start()"
     source = load_problem("free_flyer").path.read_text()
     (folder / "problems" / "late.py").write_text(f"{kill}\n{source}")
-    command = [sys.executable, "-m", "dmoc.cli", "solve", "late", "--order", "8", "--steps", "3200", "--json"]
+    command = [sys.executable, "-m", "dmoc.cli", "solve", "late", "--order", "8", "--steps", "12800", "--json"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 130
     assert ended.stderr.splitlines()[-1] == "interrupted"

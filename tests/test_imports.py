@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "files": "",
     "kept": "",
     "layout": "",
-    "lobatto": "",
+    "lobatto": "checks",
     "rows": "",
     # what acts, what pushes, what is minimised, what is forbidden, where it starts and ends
     "effects.base": "docstrings",
