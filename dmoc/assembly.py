@@ -207,28 +207,12 @@ def _hessian_entries(block: Block, scale: np.ndarray, columns: int) -> tuple:
 
 
 def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], length: int) -> ca.MX:
-    """A vector whose entry i is the sum of all entries of the pieces whose place is i.
-
-    Entries are picked, not multiplied by a matrix of ones: that takes a tenth of the time to build.
-    """
+    """A vector whose entry i is the sum of all entries of the pieces whose place is i."""
     if not pieces:
         return ca.MX(ca.DM.zeros(length))
     places = np.concatenate([place.ravel(order="F") for _, place in pieces])
-    order, counts = np.argsort(places, kind="stable"), np.bincount(places, minlength=length)
-    starts = np.cumsum(counts) - counts
-    # one entry more, which is zero, stands where there is nothing to add
-    values, nothing = ca.vertcat(*[ca.vec(piece) for piece, _ in pieces], 0), len(places)
-    total = ca.MX(0)
-    for turn in range(min(counts.max(), MOST_PICKED)):
-        some = counts > turn
-        picked = np.full(length, nothing)
-        picked[some] = order[starts[some] + turn]
-        total = total + values[picked.tolist()]
-    # an unknown that is in every step, as a free duration is
-    for place in np.flatnonzero(counts > MOST_PICKED):
-        begin, end = starts[place] + MOST_PICKED, starts[place] + counts[place]
-        total[int(place)] += ca.sum1(values[order[begin:end].tolist()])
-    return total
+    counts = np.bincount(places, minlength=length)
+    return _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts)
 
 
 def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], rows: int, columns: int) -> ca.MX:
@@ -236,9 +220,30 @@ def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], rows: int, columns: int)
     if not pieces:
         return ca.MX(rows, columns)
     keys = np.concatenate([place.ravel(order="F") for _, place in pieces])
-    unique, inverse = np.unique(keys, return_inverse=True)
-    starts = np.searchsorted(unique // rows, np.arange(columns + 1))
-    pattern = ca.Sparsity(rows, columns, starts.tolist(), (unique % rows).tolist())
-    ends = np.cumsum([place.size for _, place in pieces])[:-1]
-    placed = [(piece, place) for (piece, _), place in zip(pieces, np.split(inverse, ends), strict=True)]
-    return ca.MX(pattern, _summed(placed, len(unique)))
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    starts = np.flatnonzero(np.diff(keys, prepend=-1))
+    column, row = np.divmod(keys[starts], rows)
+    begins = np.searchsorted(column, np.arange(columns + 1))
+    pattern = ca.Sparsity(rows, columns, begins.tolist(), row.tolist())
+    return ca.MX(pattern, _picked(pieces, order, starts, np.diff(starts, append=len(keys))))
+
+
+def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> ca.MX:
+    """Sums of the entries order[starts_i], order[starts_i + 1], .. of the pieces, counts_i of them.
+
+    Entries are picked, not multiplied by a matrix of ones: that takes a tenth of the time to build.
+    """
+    # one entry more, which is zero, stands where there is nothing to add
+    values, nothing = ca.vertcat(*[ca.vec(piece) for piece, _ in pieces], 0), len(order)
+    total = ca.MX(0)
+    for turn in range(min(counts.max(), MOST_PICKED)):
+        some = counts > turn
+        picked = np.full(len(counts), nothing)
+        picked[some] = order[starts[some] + turn]
+        total = total + values[picked.tolist()]
+    # an unknown that is in every step, as a free duration is
+    for place in np.flatnonzero(counts > MOST_PICKED):
+        begin, end = starts[place] + MOST_PICKED, starts[place] + counts[place]
+        total[int(place)] += ca.sum1(values[order[begin:end].tolist()])
+    return total

@@ -14,10 +14,14 @@ from dmoc.effects.frames import RotatingFrame
 from dmoc.effects.gravity import PointGravity
 from dmoc.mechanics import Dynamics
 from dmoc.problem import TransferProblem
-from dmoc.spiral import Spiral
+from dmoc.spiral import Spiral, Winding
 
 # How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
 PASSES = 3
+# From so many revolutions on a path between two states winds evenly around the attractor.
+MANY_TURNS = 3
+# Orbits beyond this eccentricity, or this cosine of the angle between their planes, have no even change.
+MOST_ECCENTRIC, OPPOSITE = 0.9, -0.9
 
 
 def attractors_of(problem: TransferProblem) -> list[PointGravity]:
@@ -47,7 +51,7 @@ def coast(problem: TransferProblem, times: np.ndarray, q: np.ndarray, v: np.ndar
     dynamics = Dynamics.of(problem, conservative)
     n, still = problem.dimension, np.zeros(problem.dimension)
     centers = [center_of(attractor, n) for attractor in attractors_of(problem)]
-    least = [0.02 * np.linalg.norm(q - center) for center in centers]
+    least = [0.02 * math.dist(q, center) for center in centers]
     fell_in = False
 
     # through CasADi's buffers, without copies: the arrays they point to live as long as this call
@@ -64,7 +68,7 @@ def coast(problem: TransferProblem, times: np.ndarray, q: np.ndarray, v: np.ndar
         arguments[0][0], arguments[1][:], arguments[2][:] = problem.start_time + t, state[:n], state[n:]
         evaluate()
         for center, near in zip(centers, least, strict=True):
-            fell_in |= math.dist(state[:n], center) < near
+            fell_in = fell_in or math.dist(state[:n], center) < near
         return np.concatenate([state[n:], np.zeros(n) if fell_in else pull])
 
     sizes = [np.abs(q).max() or 1.0, np.abs(v).max() or 1.0]
@@ -106,17 +110,44 @@ def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Sp
     return spiral if gap < 0.05 * _distance(place, spiral.center[: problem.dimension]) else None
 
 
+def winding_path(
+    problem: TransferProblem, duration: float, states: Any, fractions: np.ndarray, more: int = 0
+) -> np.ndarray | None:
+    """Positions of many revolutions between two states around a lone attractor, or of so many more.
+
+    None where there is no such path: an end is open, the orbits are too different or the revolutions few.
+    """
+    attractor = lone_attractor(problem)
+    if attractor is None or not (problem.start.anchored and problem.goal.anchored):
+        return None
+    start, goal = _from_center(problem, attractor, states)
+    spins = np.cross(*start), np.cross(*goal)
+    if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
+        return None
+    winding = Winding(attractor.mu, duration, start, goal, more)
+    if winding.eccentricity > MOST_ECCENTRIC or winding.turns - more < MANY_TURNS or not (more or winding.fits):
+        return None
+    n = problem.dimension
+    return winding.positions(fractions)[:, :n] + center_of(attractor, n)
+
+
+def _from_center(problem: TransferProblem, attractor: PointGravity, states: Any) -> list[tuple]:
+    """Start and goal with three axes, from the attractor."""
+    center, fill = center_of(attractor, problem.dimension), np.zeros(3 - problem.dimension)
+    return [(np.append(q - center, fill), np.append(v, fill)) for q, v in states]
+
+
 def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: bool) -> Spiral | None:
-    attractor, n = lone_attractor(problem), problem.dimension
+    attractor = lone_attractor(problem)
     if attractor is None:
         return None
-    center, fill = center_of(attractor, n), np.zeros(3 - n)
-    start, goal = ((np.append(q - center, fill), np.append(v, fill)) for q, v in states)
+    start, goal = _from_center(problem, attractor, states)
     if not (np.any(start[0]) and np.any(goal[0])):
         # in the attractor itself: refused, in words, when the effects are looked at
         return None
-    spiral = Spiral(attractor.mu, np.append(center, fill), duration, start, goal, from_goal)
-    return spiral if spiral.eccentricity < 0.9 else None
+    center = np.pad(center_of(attractor, problem.dimension), (0, 3 - problem.dimension))
+    spiral = Spiral(attractor.mu, center, duration, start, goal, from_goal)
+    return spiral if spiral.eccentricity < MOST_ECCENTRIC else None
 
 
 def _end_of(spiral: Spiral, dimension: int) -> tuple[np.ndarray, np.ndarray]:

@@ -45,7 +45,7 @@ class Planner:
     def multipliers(self) -> dict[str, np.ndarray]:
         """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
         columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
-        answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0.0)
+        answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0, 0.0)
         return self.by_name(path_of(self.nlp, self.scene.problem, answer).multipliers)
 
     def by_name(self, multipliers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -44,6 +44,7 @@ class Answer:
     objective: float
     status: str
     iterations: int
+    evaluations: int
     seconds: float
 
 
@@ -74,10 +75,7 @@ def make_solver(
         "ipopt.acceptable_iter": 0,
         "ipopt.max_iter": 1000,
     }
-    limited = (
-        bool((nlp.row_bounds[0] < nlp.row_bounds[1]).any()) or nlp.problem.actuator.force_limit() is not None
-    )
-    if limited:
+    if nlp.problem.limited:
         # with barrier terms the default matching delays pivots: 8 s instead of 0.15 s an iteration was seen
         settings["ipopt.mumps_permuting_scaling"] = 0
         if len(nlp.mesh) > 1000:
@@ -122,7 +120,8 @@ def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -
     stats = solver.stats()
     x, lam_x, lam_g, g = (np.array(result[key]).ravel() for key in ("x", "lam_x", "lam_g", "g"))
     status = STATUS.get(stats["return_status"], "failed")
-    return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), seconds)
+    calls = sum(count for name, count in stats.items() if name.startswith("n_call_nlp"))
+    return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), calls, seconds)
 
 
 def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> Guess:

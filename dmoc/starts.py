@@ -52,7 +52,7 @@ def local_optima(
     keep-out zones paths that bend around each on either side, then random bends. The same numbers
     are drawn every time.
     """
-    base = starting_guess(problem, check_mesh(COARSEST_NODES // (order // 2)), order, hold, guess)
+    base = starting_guess(problem, check_mesh(COARSEST_NODES[True] // (order // 2)), order, hold, guess)
     least = Climb(problem).least_steps(base)
     if least > len(base.mesh) - 1:
         base = starting_guess(problem, check_mesh(least), order, hold, guess)

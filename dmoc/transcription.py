@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -12,10 +13,11 @@ from dmoc.assembly import Assembly, assemble
 from dmoc.blocks import Transcript
 from dmoc.checks import entries, flag, number, of_kind, short, whole
 from dmoc.guess import starting_guess
+from dmoc.kept import kept
 from dmoc.layout import Layout
 from dmoc.lobatto import Scheme, scheme
 from dmoc.mechanics import Dynamics, state_symbols
-from dmoc.mesh import Guess, node_weights, uniform_mesh
+from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.rows import values_of
 
@@ -245,23 +247,28 @@ def units_of(problem: TransferProblem, guess: Guess) -> Units:
 
 
 def _cost(problem: TransferProblem, guess: Guess, force: float) -> float:
-    """Objective along a guess, with `force` [N] in place of its controls if that is not zero."""
-    n, rule = problem.dimension, scheme(guess.order)
-    t, q, v, m = state_symbols(n)
-    u = ca.SX.sym("u", problem.actuator.size(n))
-    rate = ca.Function("rate", [t, q, v, u, m], [problem.objective.rate(problem.actuator, t, q, v, u, m)])
-    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
-    fractions = guess.fractions
-    times = problem.start_time + guess.duration * fractions
-    velocity = np.gradient(guess.position, times, axis=0)
-    control = guess.control if not guess.hold else guess.control[: len(fractions)]
-    if guess.hold:
-        nodes = np.minimum(np.searchsorted(guess.mesh, fractions, side="right") - 1, len(guess.mesh) - 2)
-        control = guess.control[nodes]
+    """About the objective along a guess, with `force` [N] in place of its controls if that is not zero."""
+    parts = problem.dimension, problem.objective, problem.actuator
+    rate, terminal = kept(partial(_cost_functions, problem), "cost", *parts)
+    # a few hundred nodes tell the size
+    some = np.unique(np.linspace(0, len(guess.position) - 1, 400).astype(int))
+    times = problem.start_time + guess.duration * guess.fractions[some]
+    velocity = np.gradient(guess.position[some], times, axis=0)
+    nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
+    control = guess.control[np.minimum(nodes, len(guess.mesh) - 2)] if guess.hold else guess.control[some]
     control = np.full_like(control, force) if force else control
-    rates = np.array(rate(times[None], guess.position.T, velocity.T, control.T, guess.mass[None])).ravel()
+    rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
     end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
-    return float(guess.duration * node_weights(guess.mesh, rule) @ rates + float(end))
+    return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
+
+
+def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
+    """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
+    t, q, v, m = state_symbols(problem.dimension)
+    u = ca.SX.sym("u", problem.actuator.size(problem.dimension))
+    rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
+    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
+    return ca.Function("rate", [t, q, v, u, m], [rate]), terminal
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
