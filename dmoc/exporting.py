@@ -17,9 +17,11 @@ import casadi as ca
 import numpy as np
 
 from dmoc import __version__, export_functions, export_residual, export_solver
+from dmoc.checks import flag, of_kind
 from dmoc.export_code import write_code
 from dmoc.export_functions import Exported
 from dmoc.export_solver import Planner
+from dmoc.files import path_of
 from dmoc.lobatto import scheme
 from dmoc.problem import TransferProblem
 from dmoc.solver import DEFAULT_STEPS
@@ -84,7 +86,9 @@ def export(
         If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
     """
     steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
-    target = _checked_folder(Path(folder))
+    of_kind("problem", problem, TransferProblem)
+    hold, c = flag("hold", hold), flag("c", c)
+    target = _checked_folder(path_of(folder))
     planner = Planner.of(problem, order, steps, hold, guess)
     functions = functions_of(planner, options)
     with _whole_folder(target) as work:

@@ -8,6 +8,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from dmoc.checks import short
+
+
+def path_of(path: str | os.PathLike) -> Path:
+    """A path, or a ValueError if it is none."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ValueError(f"a file is named by a text or a path; got {short(path)}")
+    return Path(path)
+
 
 @contextmanager
 def whole_file(path: str | os.PathLike) -> Iterator[Path]:
@@ -21,7 +30,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     ValueError
         If the folder does not exist, or the path is itself a folder.
     """
-    target = Path(path)
+    target = path_of(path)
     if not target.parent.is_dir():
         raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
     if target.is_dir():

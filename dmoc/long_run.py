@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.boundary import State
-from dmoc.checks import number
+from dmoc.checks import entries, number, of_kind
 from dmoc.effects.gravity import PointGravity
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map, weighted
@@ -109,13 +109,18 @@ def drift(
     ValueError
         If the start has free entries, the period is not known, or there is no such method.
     """
+    of_kind("problem", problem, TransferProblem)
+    revolutions = number("revolutions", revolutions, "-", positive=True)
     if np.isnan(problem.start.fixed()).any():
         raise ValueError(f"drift needs a start without free entries; got {problem.start.words()}")
     chosen = PER_REVOLUTION if methods is None else methods
-    for name in set(chosen) - set(PER_REVOLUTION):
-        raise ValueError(f"there is no method {name!r}; choose from {', '.join(PER_REVOLUTION)}")
+    for name, choices in of_kind("methods", chosen, Mapping).items():
+        if name not in PER_REVOLUTION:
+            raise ValueError(f"there is no method {name!r}; choose from {', '.join(PER_REVOLUTION)}")
+        for choice in entries(choices) or (choices,):
+            number(f"methods[{name!r}]", choice, "-", positive=True)
     period = _period(problem) if period is None else number("period", period, "s", positive=True)
-    duration = number("revolutions", revolutions, "-", positive=True) * period
+    duration = revolutions * period
     dynamics, rows = Dynamics(problem.dimension, problem.effects), []
     for name, choices in chosen.items():
         for choice in choices:

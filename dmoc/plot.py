@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.checks import of_kind
 from dmoc.constraints import SpeedLimit
 from dmoc.engines import Nozzles
-from dmoc.files import whole_file
+from dmoc.files import path_of, whole_file
 from dmoc.objectives import Objective, Time
 from dmoc.plot_ledger import draw_ledger
 from dmoc.plot_path import burning, draw_path, entries_once, is_wide
@@ -62,7 +62,8 @@ def save_figure(
     ValueError
         If the suffix is another one or the folder does not exist.
     """
-    if Path(path).suffix.lower() not in SUFFIXES:
+    of_kind("solution", solution, Solution)
+    if path_of(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     page = figure(solution, report)
     with whole_file(path) as temporary:

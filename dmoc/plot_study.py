@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.files import whole_file
+from dmoc.files import path_of, whole_file
 from dmoc.plot import SUFFIXES
 from dmoc.plot_style import DARK, SETTINGS
 from dmoc.study import Trial
@@ -49,7 +48,7 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
 
 def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150) -> None:
     """Write a figure into a .png, .pdf or .svg file, whole or not at all; ValueError if it cannot be."""
-    if Path(path).suffix.lower() not in SUFFIXES:
+    if path_of(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.files import whole_file
+from dmoc.files import path_of, whole_file
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
 from dmoc.solution import Error, Level, Provenance, Solution
@@ -51,7 +51,7 @@ def write(solution: Solution, path: str | os.PathLike) -> None:
 
 def read(path: str | os.PathLike) -> Solution:
     """The solution in a file, without its problem; see `dmoc.load`."""
-    file = Path(path)
+    file = path_of(path)
     _refuse_what_is_no_netcdf(file)
     dataset = _open(file)
     _refuse_other_formats(file, dataset.attrs)

@@ -31,7 +31,7 @@ MAY_IMPORT = {
     # numbers and words that know nothing of the rest
     "checks": "",
     "docstrings": "",
-    "files": "",
+    "files": "checks",
     "kept": "",
     "layout": "",
     "lobatto": "checks",
