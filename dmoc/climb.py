@@ -19,6 +19,7 @@ from dmoc.simulation import end_momenta, force_of
 from dmoc.solution import Level, Provenance, Solution
 from dmoc.stability import flow_matrices, refuse_unstable
 from dmoc.transcription import NLP, transcribe_onto, units_of
+from dmoc.tube import in_tube, out_of_tube
 
 # Nodes of the coarsest mesh, and how much finer the next ones are: where there are limits, which take many
 # iterations, and where there are none. Without, 400 nodes take no longer than 100 and 400 after them.
@@ -123,17 +124,21 @@ class Climb:
 
     def solve_on(self, guess: Guess, rounding: float | None = None) -> bool:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
-        if self._attempt(guess, rounding):
-            return True
-        warm = bool(guess.multipliers) and self.answer.status != "stopped"
-        return warm and self._attempt(replace(guess, multipliers={}), rounding)
+        problem = self._rounded(rounding)
+        if guess.multipliers:
+            if self._attempt(guess, problem) or self.answer.status == "stopped":
+                return self.answer.status == "solved"
+            guess = replace(guess, multipliers={})
+        near = in_tube(problem, guess)
+        if near is not None and self._attempt(guess, near):
+            guess = out_of_tube(self.path)
+        return self._attempt(guess, problem)
 
-    def _attempt(self, guess: Guess, rounding: float | None) -> bool:
+    def _attempt(self, guess: Guess, problem: TransferProblem) -> bool:
         if self.interrupt.seen and self.levels:
             self.answer = replace(self.answer, status="stopped")
             return False
         begun = time.perf_counter()
-        problem = self._rounded(rounding)
         self.nlp = transcribe_onto(problem, guess, units_of(problem, guess))
         if not self.levels:
             refuse_undefined_rows(self.nlp, problem, guess)
@@ -143,7 +148,7 @@ class Climb:
         answer = self.answer = run(solver, self.nlp, problem, guess)
         steps, objective = len(guess.mesh) - 1, self.nlp.objective(answer.objective)
         counts = {"iterations": answer.iterations, "evaluations": answer.evaluations}
-        times = {"build_s": built, "solve_s": answer.seconds}
+        times: dict[str, Any] = {"build_s": built, "solve_s": answer.seconds}
         self.levels.append(
             Level(guess.order, steps, objective=objective, status=answer.status, **counts, **times)
         )

@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from dmoc.checks import short
-from dmoc.coasting import attractors_of, center_of, coast, end_estimates, lone_attractor, spiral_between
+from dmoc.coasting import (
+    attractors_of,
+    center_of,
+    coast,
+    end_estimates,
+    lone_attractor,
+    spiral_between,
+    winding_path,
+)
 from dmoc.constraints import KeepOut
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
@@ -72,6 +80,12 @@ def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
         distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
         squares += attractor.mu / np.maximum(distance, 1e-90) ** 3
     return np.sqrt(squares)
+
+
+def angle_around(problem: TransferProblem, guess: Guess) -> float:
+    """About the angle that a path turns through around all attractors [rad]."""
+    rates = orbital_rates(problem, guess.position)
+    return float(np.trapezoid(rates, guess.duration * guess.fractions))
 
 
 def is_uneven(problem: TransferProblem, guess: Guess) -> bool:
@@ -177,6 +191,9 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
     if spiral is not None:
         path = spiral.states(fractions)[0] + spiral.center
         return path[:, : problem.dimension], (v0, v1), True
+    winding = winding_path(problem, duration, ((q0, v0), (q1, v1)), fractions)
+    if winding is not None:
+        return winding, (v0, v1), True
     turns = duration * orbital_rates(problem, np.stack([q0, q1])).max()
     sample = np.linspace(0.0, 1.0, int(np.clip(20 * turns, 2000, MOST_SAMPLES)))
     forward = coast(problem, duration * sample, q0, v0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -89,3 +90,120 @@ class Spiral:
     @cached_property
     def _spins(self) -> np.ndarray:
         return np.linalg.norm(self._elements[0], axis=1)
+
+
+# The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these.
+MOST_BENT = 0.9
+SAMPLES_A_TURN, ROUNDS = 100, 5
+
+
+@dataclass(frozen=True)
+class Winding:
+    """Revolutions from one state to another around one attractor; three axes, from the attractor.
+
+    The modified equinoctial elements p, f, g, h, k of M. J. H. Walker, Celestial Mechanics 36 (1985),
+    go from the one orbit to the other as the true longitude L grows, and the body moves as fast as on
+    the orbit of the moment. The number of revolutions is the one that takes about the duration, or so
+    many `more`; what is left goes into an earlier or later change of the orbit, and where that is not
+    enough into the pace.
+    """
+
+    mu: float
+    duration: float
+    start: tuple[np.ndarray, np.ndarray]
+    goal: tuple[np.ndarray, np.ndarray]
+    more: int = 0
+
+    def positions(self, fractions: np.ndarray) -> np.ndarray:
+        """At these fractions of the duration, shape (count, 3) [m]."""
+        from scipy.interpolate import CubicSpline
+
+        at, times = self._times(self.turns, self.bend)
+        elements, longitude = self._orbits(CubicSpline(times / times[-1], at)(fractions), self.turns, self.bend)
+        radius, axes = self._radius(elements, longitude), _axes(*elements[3:])
+        return radius[:, None] * (axes[0] * np.cos(longitude) + axes[1] * np.sin(longitude)).T @ self._frame
+
+    @property
+    def eccentricity(self) -> float:
+        """The larger of the two ends'."""
+        return max(float(np.hypot(*elements[1:3])) for elements, _ in self._ends)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the motion takes the duration without a change of its pace."""
+        return abs(self.bend) < MOST_BENT
+
+    @cached_property
+    def turns(self) -> int:
+        """Whole revolutions beyond the angle between the ends."""
+        turns = 10
+        for _ in range(ROUNDS):
+            turns = max(round((turns + 1) * self.duration / self._time(turns)) - 1, 0)
+        return max(turns + self.more, 0)
+
+    @cached_property
+    def bend(self) -> float:
+        """How much earlier the orbit changes than evenly."""
+        from scipy.optimize import brentq
+
+        def late(bend: float) -> float:
+            return self._time(self.turns, bend) - self.duration
+
+        early, even = -MOST_BENT, late(0.0)
+        if late(-MOST_BENT) * late(MOST_BENT) < 0:
+            return float(brentq(late, -MOST_BENT, MOST_BENT, xtol=1e-6))
+        rising = late(MOST_BENT) > late(early)
+        return early if rising == (even > 0) else MOST_BENT
+
+    def _time(self, turns: int, bend: float = 0.0) -> float:
+        return float(self._times(turns, bend)[1][-1])
+
+    def _times(self, turns: int, bend: float) -> tuple[np.ndarray, np.ndarray]:
+        """Fractions of the angle and the times there [s]: dt = r^2 / sqrt(mu p) dL."""
+        at = np.linspace(0.0, 1.0, SAMPLES_A_TURN * (turns + 1) + 1)
+        elements, longitude = self._orbits(at, turns, bend)
+        pace = self._radius(elements, longitude) ** 2 / np.sqrt(self.mu * elements[0])
+        pieces = 0.5 * (pace[1:] + pace[:-1]) * np.diff(longitude)
+        return at, np.append(0.0, np.cumsum(pieces))
+
+    def _orbits(self, at: np.ndarray, turns: int, bend: float) -> tuple[np.ndarray, np.ndarray]:
+        """p, f, g, h, k of the moment, shape (5, count), and L, at fractions of the angle."""
+        (first, begin), (last, end) = self._ends
+        end = begin + (end - begin) % (2 * np.pi) + 2 * np.pi * turns
+        share = at + bend * at * (1 - at)
+        return first[:, None] * (1 - share) + last[:, None] * share, begin + at * (end - begin)
+
+    @staticmethod
+    def _radius(elements: np.ndarray, longitude: np.ndarray) -> np.ndarray:
+        return elements[0] / (1 + elements[1] * np.cos(longitude) + elements[2] * np.sin(longitude))
+
+    @cached_property
+    def _frame(self) -> np.ndarray:
+        """Rows: three axes, the last one along the mean angular momentum."""
+        spins = [np.cross(*state) for state in (self.start, self.goal)]
+        normal = sum(spin / np.linalg.norm(spin) for spin in spins)
+        normal = normal / np.linalg.norm(normal)
+        first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.cross(normal, first), normal])
+
+    @cached_property
+    def _ends(self) -> list[tuple[np.ndarray, float]]:
+        """(p, f, g, h, k) and L of the start and of the goal."""
+        found = []
+        for q, v in ((self._frame @ part for part in state) for state in (self.start, self.goal)):
+            spin = np.cross(q, v)
+            x, y, z = spin / np.linalg.norm(spin)
+            h, k = -y / (1 + z), x / (1 + z)
+            first, second = _axes(h, k)
+            e = np.cross(v, spin) / self.mu - q / np.linalg.norm(q)
+            elements = np.array([spin @ spin / self.mu, e @ first, e @ second, h, k])
+            found.append((elements, float(np.arctan2(q @ second, q @ first))))
+        return found
+
+
+def _axes(h: Any, k: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The equinoctial axes in the orbit's plane."""
+    square = 1 + h * h + k * k
+    first = np.array([1 + h * h - k * k, 2 * h * k, -2 * k]) / square
+    return first, np.array([2 * h * k, 1 - h * h + k * k, 2 * h]) / square

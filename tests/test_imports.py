@@ -64,6 +64,7 @@ MAY_IMPORT = {
     # the way from a problem to a solution
     "spiral": "",
     "coasting": "EFFECTS boundary mechanics problem spiral",
+    "tube": "coasting constraints guess mesh problem",
     "guess": "BASICS coasting constraints mechanics mesh problem simulation",
     "formulas": "BASICS assembly mechanics problem",
     "blocks": "BASICS assembly formulas mesh problem",
@@ -74,9 +75,9 @@ MAY_IMPORT = {
     "relaxation": "BASICS NLP",
     "diagnose": "BASICS PARTS NLP relaxation",
     "faults": "BASICS PARTS EFFECTS NLP",
-    "climb": "BASICS NLP MOTION solution diagnose faults",
+    "climb": "BASICS NLP MOTION solution diagnose faults tube",
     "refine": "BASICS NLP MOTION solution climb",
-    "solver": "BASICS NLP MOTION solution climb refine",
+    "solver": "BASICS NLP MOTION solution climb coasting refine",
     # what is judged: never with the solver's own words
     "case": "BASICS mechanics mesh problem simulation solution",
     "limits": "BASICS case mechanics",
