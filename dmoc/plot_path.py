@@ -154,19 +154,21 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
         axes.set_aspect("equal", adjustable="datalim")
         return
     spans = view[1] - view[0]
+    tall = spans[2] > 0.9 * spans[:2].max()
     for i, name in enumerate(names):
         axis = getattr(axes, f"{name}axis")
         axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
         # a short side has room for few numbers
         axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
         # matplotlib measures this distance along the other two sides; make it the same for all three
-        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, 9.0)
+        least = 9.0 if name == "z" and not tall else 12.0
+        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, least)
     for artist in (*axes.lines, *axes.collections):
         # the enlarged box reaches beyond the rectangle that would clip it; only its sides are laid out
         artist.set_clip_on(False)
         artist.set_in_layout(False)
     # a tall box would reach into the legend below
-    axes.set_box_aspect(spans, zoom=0.88 if spans[2] > 1.2 * spans[:2].max() else 1.07)
+    axes.set_box_aspect(spans, zoom=0.88 if tall else 1.07)
     axes.set_anchor("N")
     axes.view_init(elev=25, azim=-60)
 

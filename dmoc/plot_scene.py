@@ -103,7 +103,7 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
         axes.add_patch(disc)
         return
     # the poles are left out: a triangle without area has no shade
-    around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 37), np.linspace(1e-3, np.pi - 1e-3, 19))
+    around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 31), np.linspace(1e-3, np.pi - 1e-3, 16))
     unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
     surface = center[:, None, None] + radius * unit
     # axes in space do not clip
