@@ -34,14 +34,14 @@ SETTINGS: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.formatter.use_mathtext": True,
-    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.limits": (-3, 5),
 }
 
 # Other units in which a number reads better: the least value drawn in them and their size, largest first.
 _UNITS = {
     "s": ((3 * 86400.0, 86400.0, "days"), (3 * 3600.0, 3600.0, "h")),
     "m": ((1e4, 1e3, "km"),),
-    "m/s": ((1e5, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
+    "m/s": ((1e4, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
     "N": ((1e4, 1e3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e-3, "mN")),
     "J": ((1e10, 1e9, "GJ"), (1e7, 1e6, "MJ"), (1e4, 1e3, "kJ"), (1e-2, 1.0, "J"), (0.0, 1e-3, "mJ")),
     "J/kg": ((1e7, 1e6, "MJ/kg"), (1e4, 1e3, "kJ/kg")),
