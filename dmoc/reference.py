@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import casadi as ca
 import numpy as np
 
+from dmoc.kept import kept
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, weighted
 from dmoc.mesh import Guess, step_nodes
@@ -31,7 +34,10 @@ def reference(
     n, steps = dynamics.dimension, len(path.mesh) - 1
     control = _control_powers(dynamics, path)
     start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
-    advance = _dop853(dynamics, control.shape[0], path.position[0], _tolerances(path, velocity, control))
+    march_one = kept(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
+    given = march_one.mx_in()[:-2]
+    constants = path.position[0], _tolerances(path, velocity, control)
+    advance = ca.Function("advance", given, march_one(*given, *constants))
     parts = np.ones(steps, int)
     while parts.sum() <= MOST_PARTS:
         owner = np.repeat(np.arange(steps), parts)
@@ -73,17 +79,19 @@ def _tolerances(path: Guess, velocity: np.ndarray, control: np.ndarray) -> np.nd
     return 1e-12 * np.concatenate([np.repeat([extent, speed], n), path.mass[:1]])
 
 
-def _dop853(dynamics: Dynamics, size: int, origin: np.ndarray, tolerances: np.ndarray) -> ca.Function:
-    """(state, control, t, h, begin, share) -> state after that part of a step, error over its tolerance.
+def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
+    """(state, control, t, h, begin, share, origin, tolerances) -> state after that part of a step, error.
 
-    The state is position from `origin`, velocity and mass; `control` the coefficients of `_control_powers`;
-    a part is `share` of a step of length h [s] that starts at t [s], from the fraction `begin` on.
+    The error is in units of its tolerance. The state is position from `origin`, velocity and mass;
+    `control` the coefficients of `_control_powers`; a part is `share` of a step of length h [s] that
+    starts at t [s], from the fraction `begin` on.
     """
     from scipy.integrate import DOP853
 
     n, count = dynamics.dimension, dynamics.actuator.size(dynamics.dimension)
     state, powers = ca.SX.sym("state", 2 * n + 1), ca.SX.sym("control", size)
     t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
+    origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", 2 * n + 1)
 
     def rate(fraction, y):
         u = sum(powers[count * p : count * (p + 1)] * fraction**p for p in range(size // count))
@@ -102,4 +110,4 @@ def _dop853(dynamics: Dynamics, size: int, origin: np.ndarray, tolerances: np.nd
     scale = tolerances + 1e-11 * ca.fmax(ca.fabs(state), ca.fabs(after))
     fifth, third = (ca.sumsqr(weighted(row, slopes) / scale) for row in (DOP853.E5, DOP853.E3))
     error = length * fifth / ca.sqrt((fifth + 0.01 * third) * state.numel() + 1e-300)
-    return ca.Function("dop853", [state, powers, t, h, begin, share], [after, error])
+    return ca.Function("dop853", [state, powers, t, h, begin, share, origin, tolerances], [after, error])

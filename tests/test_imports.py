@@ -58,7 +58,7 @@ MAY_IMPORT = {
     "mesh": "lobatto",
     "assembly": "",
     # motion forward in time; the guess and the refinement may use it
-    "reference": "lobatto mechanics mesh",
+    "reference": "kept lobatto mechanics mesh",
     "simulation": "checks kept lobatto mechanics mesh problem reference",
     "stability": "lobatto mechanics mesh simulation",
     # the way from a problem to a solution
