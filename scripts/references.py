@@ -73,6 +73,7 @@ MARS = "Bryson & Ho 1975: {}; indirect shooting"
 COPS = "COPS 3.0: 1.01283; collocation in three phases"
 SHOOTING = "40 segments of constant thrust (3)"
 NO_AIR = {"oblate": False, "air": False}
+# One line an optimum that is known; where more than the mesh explains differs, a note below.
 TABLE = (
     Reference("point_to_point", "effort", 6 * 13**2 / 26**3, "closed form, 6 m² d² / T³", (4, 10), 1e-12),
     Reference("bang_bang", "least time", 2.0, "closed form, 2 √(m d / F)", (2, 400), 1e-8),

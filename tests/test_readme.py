@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from dmoc.library import catalogue
+
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text()
 COMMAND = r"^ {4}\./scripts/run dmoc (?P<command>[^\n]*)$"
@@ -55,6 +57,15 @@ def test_every_file_the_readme_names_is_there():
     named = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXT)
     named += re.findall(r"\b((?:scripts|dmoc|tests|problems)/[\w/]+\.\w+)", TEXT)
     assert named and not [name for name in named if not (ROOT / name).exists()]
+
+
+@pytest.mark.parametrize("name", [name for name, _ in catalogue()])
+def test_every_problem_is_in_the_gallery_and_says_what_is_known_of_its_optimum(name):
+    """If not: run scripts/gallery.py; add a line to scripts/references.py, or a word below its table."""
+    known = re.search(r"^## Known optima\n.*?(?=^## )", TEXT, re.MULTILINE | re.DOTALL)
+    assert known
+    assert f"[{name}](problems/gallery/{name}.png)" in TEXT and f"`dmoc solve {name}`" in TEXT
+    assert f"`{name}`" in known[0]
 
 
 def test_pictures_of_the_gallery_are_of_moderate_size():
