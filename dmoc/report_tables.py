@@ -30,7 +30,7 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
         "share of\nthe time",
     ):
         table.add_column(name, justify="right")
-    for row, following in zip(rows, [*rows[1:], None], strict=True):
+    for i, row in enumerate(rows):
         table.add_row(
             row.name if row.listed else f"({row.name})",
             f"{row.acceleration:.2e} m/s\u00b2",
@@ -38,7 +38,7 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
             f"{row.instructions:,}",
             f"{100 * row.time_share:.0f} %",
             style=None if row.listed else "dim",
-            end_section=following is not None and following.listed != row.listed,
+            end_section=any(following.listed != row.listed for following in rows[i + 1 : i + 2]),
         )
     note = (
         f"Along the solved path of {solution.provenance.problem_name} (order {solution.order}, "
@@ -47,7 +47,7 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
     )
     if not all(row.listed for row in rows):
         note += " Effects in brackets are not in the scene: what they would do and cost."
-    return Group(table, Text(note))
+    return Group(table, Text(note)) if rows else Text("The scene has no effect: there is nothing to leave out.")
 
 
 def _length(metres: float) -> str:

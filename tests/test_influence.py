@@ -1,13 +1,16 @@
 """What an effect is said to do is what it does: held to closed forms."""
 
+import io
 import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from dmoc import LinearDrag, PointGravity, State, TransferProblem, UniformGravity, solve
 from dmoc.influence import EARTH_MU, candidates, influences
+from dmoc.report_tables import influence_table
 
 
 def test_leaving_out_gravity_moves_the_goal_by_the_fall():
@@ -42,6 +45,19 @@ def test_around_the_earth_the_library_offers_what_is_missing():
     )
     assert not candidates(TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0))
     assert "ThirdBody, the Moon" in [row.name for row in rows]
+
+
+def test_the_table_keeps_what_is_in_the_scene_apart_and_is_a_word_without_effects():
+    def shown(problem, others):
+        console = Console(width=120, record=True, file=io.StringIO())
+        solution = solve(problem, order=4, steps=10)
+        console.print(influence_table(influences(solution, others), solution))
+        return console.export_text()
+
+    ends = State((7e6, 0), (0, 7546.0)), State((0, 7e6), (-7546.0, 0))
+    table = shown(TransferProblem(500.0, *ends, 1457.0, [PointGravity(EARTH_MU)]), True)
+    assert "PointGravity, mu 3.986e+14 m^3/s^2" in table and "(ThirdBody, the Moon)" in table
+    assert "no effect" in shown(TransferProblem(500.0, *ends, 1457.0), False)
 
 
 def test_every_further_effect_costs_more_and_none_costs_least():
