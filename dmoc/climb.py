@@ -185,7 +185,9 @@ class Climb:
         sample = guess.onto(uniform_mesh(min(100, len(guess.mesh) - 1)), 2, guess.hold)
         slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
         flow, _ = flow_matrices(self.dynamics, sample, self.problem.start_time, slopes)
-        fastest = np.abs(np.linalg.eigvals(flow)).max() if np.isfinite(flow).all() else np.inf
+        rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full(1, np.inf)
+        # what dies out need not be followed
+        fastest = max(rates.real.max(), np.abs(rates.imag).max())
         return int(np.clip(guess.duration * fastest, 2, MOST_COARSE))
 
     def solution(self, **found: Any) -> Solution:

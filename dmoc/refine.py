@@ -2,141 +2,205 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.climb import Climb
-from dmoc.guess import starting_guess
+from dmoc.guess import graded_guess, is_uneven, starting_guess
 from dmoc.lobatto import scheme
-from dmoc.mechanics import Dynamics, step_map
-from dmoc.mesh import Guess, step_nodes, uniform_mesh
+from dmoc.mechanics import Dynamics, state_symbols, step_map
+from dmoc.mesh import Guess, node_weights, step_nodes
 from dmoc.problem import TransferProblem
 from dmoc.simulation import end_momenta, reference
 from dmoc.solution import Error, Solution
 from dmoc.transcription import check_mesh
 
-MOST_NODES = 200_000
+MOST_NODES, MOST_MESHES = 200_000, 14
 TRIAL_ORDER, TRIAL_STEPS = 4, 20
+# Into how many parts a step is cut where the control jumps, and the shortest step that this makes.
+PARTS, SHORTEST = 4, 1e-5
+# A control within this share of its span of a limit is at the limit; so many nodes between make an arc.
+BETWEEN = 0.05
+# More switches than this are not listed.
+MOST_JUMPS = 12
+# By how much the error falls from mesh to mesh, at least.
+LEAST_FALL = 1.5
+TINY = float(np.finfo(float).tiny)
 
 
 def climb_to_tolerance(
     climb: Climb, tol: float, order: int | None, steps: int | None, hold: bool, guess: Any
 ) -> Solution:
-    """Refine until the estimated error is below a tolerance, on pairs of a mesh and its bisection.
+    """Refine until the estimated error is below a tolerance, on meshes that each cut steps of the one before.
 
-    A trial on a coarse mesh tells whether the controls switch or limits bend the path, and so which
-    order pays; then steps move to where the local error is and their number follows from the order.
+    A trial on a coarse mesh tells whether the controls switch or limits set in, and so which order
+    pays. All step ends are kept from mesh to mesh: the answer on one is a good start for the next, and
+    the change there tells the error.
     """
-    problem, trial = climb.problem, order or TRIAL_ORDER
-    first = starting_guess(problem, check_mesh(steps or TRIAL_STEPS), trial, hold, guess)
-    enough = 2 * climb.least_steps(first)
-    if steps is None and enough > TRIAL_STEPS:
-        first = starting_guess(problem, check_mesh(enough), trial, hold, guess)
-    if not climb.up_to(first, guess):
+    problem = climb.problem
+    if not climb.up_to(_first(climb, order or TRIAL_ORDER, steps, hold, guess), guess):
         return climb.solution(tolerance=tol)
-    path = climb.path
-    corners = _corners(problem, path, climb.levels[-1].objective)
-    order, reason = (order, "as asked for") if order else _best_order(tol, hold, corners)
-    mesh = uniform_mesh(max(8, (len(path.mesh) - 1) * trial // order))
-    history: list[tuple[int, float]] = []
+    path, objective = climb.path, climb.levels[-1].objective
+    order, reason = (order, "as asked for") if order else _best_order(problem, path, objective, tol)
+    local = not _is_singular(problem, path)
+    changes: list[tuple[float, float]] = []
+    mesh = _as_many_nodes(path, order)
+    longest = np.diff(mesh).max()
+    if order != path.order and not climb.solve_on(path.onto(mesh, order, hold)):
+        return climb.solution(tolerance=tol)
     while True:
-        pair = []
-        for ends in (mesh, bisected(mesh)):
-            if not climb.solve_on(path.onto(ends, order, hold)):
-                return climb.solution(tolerance=tol)
-            path = climb.path
-            pair.append((path, climb.levels[-1].objective))
-        corners = _corners(problem, path, pair[1][1])
-        rate = 1.0 if len(corners) else _rate(history, 2 if hold else order)
-        error = estimate(problem, climb.dynamics, pair[0], pair[1], rate)
+        path, objective = climb.path, climb.levels[-1].objective
+        parts = np.full(len(path.mesh) - 1, 2)
+        if local:
+            wanted = max(longest / PARTS ** (len(changes) + 1), SHORTEST)
+            errors = local_errors(climb.dynamics, path, problem.start_time)
+            parts = _parts(path, errors, _corners(problem, path, objective), wanted)
+        if not climb.solve_on(path.onto(_cut(path.mesh, parts), order, hold)):
+            return climb.solution(tolerance=tol)
+        changes.append(_change((path, objective), (climb.path, climb.levels[-1].objective), parts))
+        error = estimate(climb, changes, 2 if hold else order)
+        rounded = rounding_cost(problem, climb.path) / max(abs(climb.levels[-1].objective), TINY)
+        # what the rounding of |F| costs counts, but no mesh brings it down
+        met = error.largest <= tol
+        error = replace(error, objective=error.objective + rounded)
         climb.levels[-1] = replace(climb.levels[-1], error=error.largest)
-        history.append((len(mesh) - 1, error.largest))
-        if error.largest <= tol or len(path.position) > MOST_NODES or len(history) > 12:
-            return climb.solution(tolerance=tol, error=error, reason=_words(path, reason, corners))
-        growth = np.clip((2 * error.largest / tol) ** (1 / rate), 1.2, 6.0)
-        # where the control or a limit sets in at once, steps there help more than steps everywhere
-        wanted = int(np.ceil((len(mesh) - 1) * (1.2 if len(corners) else growth)))
-        mesh = next_mesh(path, local_errors(climb.dynamics, path, problem.start_time), wanted, corners)
+        if met or len(climb.path.position) > MOST_NODES or len(changes) == MOST_MESHES:
+            if rounded > tol:
+                reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
+            return climb.solution(tolerance=tol, error=error, reason=_words(problem, climb.path, reason))
 
 
-def _best_order(tol: float, hold: bool, corners: np.ndarray) -> tuple[int, str]:
+def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) -> Guess:
+    """A guess for the trial, with as many steps as the motion along it needs."""
+    problem = climb.problem
+
+    def on(count: int) -> Guess:
+        first = starting_guess(problem, check_mesh(count), order, hold, guess)
+        return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
+
+    first = on(steps or TRIAL_STEPS)
+    enough = 2 * climb.least_steps(first)
+    return on(enough) if steps is None and enough > TRIAL_STEPS else first
+
+
+def _as_many_nodes(path: Guess, order: int) -> np.ndarray:
+    """The mesh of a path for another order, with about as many nodes and at least eight steps."""
+    steps = max(8, (len(path.mesh) - 1) * path.order // order)
+    places = np.linspace(0.0, 1.0, len(path.mesh))
+    return path.mesh if order == path.order else np.interp(np.linspace(0.0, 1.0, steps + 1), places, path.mesh)
+
+
+def _best_order(problem: TransferProblem, path: Guess, objective: float, tol: float) -> tuple[int, str]:
     """The order that pays, and why."""
-    if hold:
+    if path.hold:
         return 2, "held forces are second order whatever the scheme"
-    if len(corners):
-        return 2, "controls switch or limits set in"
+    if _is_singular(problem, path):
+        return 2, "controls stay between their limits where no cost decides on them"
+    if len(_corners(problem, path, objective)):
+        return 4, "controls switch or limits set in"
     return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
+
+
+def _is_singular(problem: TransferProblem, path: Guess) -> bool:
+    """Whether the cost is linear in controls that are between their limits for longer than a switch takes.
+
+    On such arcs a control at the inner nodes of a step is not determined, and wanders.
+    """
+    u = ca.SX.sym("u", path.control.shape[1])
+    rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
+    lower, upper = problem.actuator.bounds(problem.dimension)
+    limited = np.isfinite(np.asarray(upper) - np.asarray(lower))
+    if ca.hessian(rate, u)[0].nnz() or not limited.any():
+        return False
+    share = (path.control - lower)[:, limited] / (np.asarray(upper) - lower)[limited]
+    between = ((share > BETWEEN) & (share < 1 - BETWEEN)).any(axis=1)
+    return bool((between[1:-1] & between[:-2] & between[2:]).mean() > BETWEEN)
 
 
 def _corners(problem: TransferProblem, path: Guess, objective: float) -> np.ndarray:
     """Steps in which a control jumps or a limit sets in or lets go: there higher derivatives jump.
 
-    A limit acts at a node if loosening it by its own size would change the objective by a millionth.
+    A limit acts in a step if loosening it by its own size would change the objective by a millionth.
+    A throttle with |F| rounded at zero never quite reaches its lower limit: there only jumps count.
     """
     extent, _ = path_scales(path)
-    sizes = {"column:force": problem.actuator.force_limit() or 0.0, "column:position": extent}
-    found = [control_jumps(problem, path)]
+    limit = 0.0 if problem.actuator.smoothing is not None else problem.actuator.force_limit() or 0.0
+    sizes = {"column:force": limit, "column:position": extent}
+    found, steps = [control_jumps(problem, path)], len(path.mesh) - 1
     for key, density in path.multipliers.items():
         kind, name = key.split(":", 1)
         if kind not in ("node", "control", "step"):
             continue
-        acts = np.abs(density).max(axis=1) / len(density) * sizes.get(name, 1.0) > 1e-6 * abs(objective)
+        share = np.abs(density).max(axis=1) / len(density) * sizes.get(name, 1.0)
         if name == "column:position":
-            acts[[0, -1]] = False
-        changes = np.flatnonzero(np.diff(acts))
-        found.append(changes * (len(path.mesh) - 1) // len(acts))
+            share[[0, -1]] = 0.0
+        if len(share) > steps:
+            share = share[step_nodes(steps, scheme(path.order))].max(axis=0)
+        found.append(np.flatnonzero(np.diff(share > 1e-6 * abs(objective))))
     return np.unique(np.concatenate(found))
 
 
-def _rate(history: list[tuple[int, float]], claimed: int) -> float:
-    """The order that the last refinement showed, between 1 and the claimed one."""
-    if len(history) < 2:
-        return float(claimed)
-    (few, before), (many, after) = history[-2:]
-    seen = math.log(before / max(after, 1e-300)) / math.log(many / few)
-    return min(max(seen, 1.0), float(claimed))
+def _parts(path: Guess, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
+    """Into how many parts to cut each step.
 
-
-def _words(path: Guess, reason: str, corners: np.ndarray) -> str:
-    """Such as: order 6, 48 steps: smooth."""
-    groups = int(np.count_nonzero(np.diff(corners) > 2)) + 1 if len(corners) else 0
-    found = f" at {groups} places, steps gathered there, estimate less reliable" if groups else ""
-    return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}{found}"
-
-
-def bisected(mesh: np.ndarray) -> np.ndarray:
-    """The mesh with every step halved."""
-    finer = np.empty(2 * len(mesh) - 1)
-    finer[::2], finer[1::2] = mesh, 0.5 * (mesh[:-1] + mesh[1:])
-    return finer
-
-
-def estimate(
-    problem: TransferProblem,
-    dynamics: Dynamics,
-    coarse: tuple[Guess, float],
-    fine: tuple[Guess, float],
-    rate: float,
-) -> Error:
-    """Errors of `fine`, whose mesh is that of `coarse` bisected; each a path and its objective.
-
-    The schemes are symmetric: the error is C h^rate with rate their order where the solution is smooth.
+    Two, but for those that together make little of the local errors; at corners as many as lead to the
+    shortest step wanted there, since the error falls only with the length of that step.
     """
-    extent, speed = path_scales(fine[0])
-    shrink = 1 / (2**rate - 1)
-    ends = [path.position[:: path.order // 2] for path, _ in (coarse, fine)]
-    moved = np.abs(ends[1][::2] - ends[0]).max() / extent
+    parts, order = np.full(len(errors), 2), np.argsort(errors)
+    small = np.cumsum(errors[order]) <= 0.5 * 2.0**-path.order * errors.sum()
+    parts[order[small]] = 1
+    for k in corners:
+        near = slice(max(k - 1, 0), k + 2)
+        wanted = np.round(np.diff(path.mesh)[near] / shortest).astype(int)
+        parts[near] = np.clip(wanted, 1, PARTS)
+    return parts
+
+
+def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(mesh[:-1], mesh[1:], parts, strict=True)]
+    return np.append(np.concatenate(pieces), mesh[-1])
+
+
+def _change(coarse: tuple[Guess, float], fine: tuple[Guess, float], parts: np.ndarray) -> tuple[float, float]:
+    """Relative change of path and objective from one mesh to the next, at the step ends they share."""
+    shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
+    moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max()
     stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
-    scale = max(abs(fine[1]), np.finfo(float).tiny)
-    position, velocity = reference(dynamics, fine[0], problem.start_time, fine[0].start_velocity)
-    miss = np.linalg.norm(position - fine[0].position[-1]) / extent
-    slip = np.linalg.norm(velocity - fine[0].goal_velocity) / speed
-    return Error(
-        float(max(moved, stretched) * shrink), abs(fine[1] - coarse[1]) / scale * shrink, float(max(miss, slip))
-    )
+    scale = max(abs(fine[1]), TINY)
+    return max(float(moved) / path_scales(fine[0])[0], stretched), abs(fine[1] - coarse[1]) / scale
+
+
+def estimate(climb: Climb, changes: list[tuple[float, float]], claimed: int) -> Error:
+    """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
+
+    Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
+    f is the fall of the last two changes, at most that of the scheme; where there is one, of half its order.
+    """
+    problem, path = climb.problem, climb.path
+    fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else 2 ** (claimed / 2)
+    moved, cost = (change / (min(max(fall, LEAST_FALL), 2**claimed) - 1) for change in changes[-1])
+    extent, speed = path_scales(path)
+    position, velocity = reference(climb.dynamics, path, problem.start_time, path.start_velocity)
+    miss = np.linalg.norm(position - path.position[-1]) / extent
+    slip = np.linalg.norm(velocity - path.goal_velocity) / speed
+    return Error(moved, cost, float(max(miss, slip)))
+
+
+def rounding_cost(problem: TransferProblem, path: Guess) -> float:
+    """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
+
+    The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
+    e / sqrt(|F|^2 + e^2) by e, and its multipliers are the derivatives of the objective.
+    """
+    width, density = problem.actuator.smoothing, path.multipliers.get("control:row:actuator")
+    if width is None or density is None:
+        return 0.0
+    weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
+    force = np.linalg.norm(path.control[:, : problem.dimension], axis=1) / problem.actuator.force_limit()
+    return float(abs(weights * density[:, 0] @ (width**2 / np.hypot(force, width))))
 
 
 def path_scales(path: Guess) -> tuple[float, float]:
@@ -175,37 +239,6 @@ def local_errors(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarr
     return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)
 
 
-def next_mesh(path: Guess, errors: np.ndarray, steps: int, jumps: np.ndarray) -> np.ndarray:
-    """A mesh of `steps` steps that spreads the local errors evenly, with more where the control jumps.
-
-    A step's error is C h^(order + 1): steps are placed by equal shares of C^(1/(order + 1)).
-    """
-    h = np.diff(path.mesh)
-    floor = max(errors.max() * 1e-6, 1e-16)
-    density = (np.maximum(errors, floor) ** (1 / (path.order + 1))) / h
-    # a smooth density: neighbouring steps differ by no more than about half
-    for _ in range(3):
-        padded = np.pad(density, 1, mode="edge")
-        density = np.maximum(density, 0.5 * (padded[:-2] + padded[2:]))
-    share = np.concatenate([[0.0], np.cumsum(density * h)])
-    mesh = np.interp(np.linspace(0, share[-1], steps + 1), share, path.mesh)
-    mesh[0], mesh[-1] = 0.0, 1.0
-    return _gathered(mesh, path.mesh, jumps)
-
-
-def _gathered(mesh: np.ndarray, old: np.ndarray, jumps: np.ndarray) -> np.ndarray:
-    """Add step ends where the control jumps: the steps there and next to them cut in four."""
-    extra = [mesh]
-    for k in jumps:
-        low, high = max(k - 1, 0), min(k + 2, len(old) - 1)
-        extra.append(np.linspace(old[low], old[high], 4 * (high - low) + 1))
-    merged = np.unique(np.concatenate(extra))
-    # ends closer than a thousandth of the mean step would add rows and no accuracy
-    keep = np.concatenate([[True], np.diff(merged) > 1e-3 / len(merged)])
-    keep[-1] = True
-    return merged[keep]
-
-
 def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
     """Steps within which a limited control goes from near one of its limits to near another."""
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
@@ -218,3 +251,13 @@ def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
     # a jump takes one step, or two with a node in its middle; what goes on beyond them is a steep slope
     around = np.pad(change, 2)
     return np.flatnonzero((change > 0.2) & (change > 3 * np.maximum(around[:-4], around[4:])))
+
+
+def _words(problem: TransferProblem, path: Guess, reason: str) -> str:
+    """Such as: order 4, 145 steps: controls switch or limits set in; at 0.06, 4.45 s."""
+    jumps = control_jumps(problem, path)
+    times = problem.start_time + path.duration * 0.5 * (path.mesh[jumps] + path.mesh[jumps + 1])
+    # a jump may take two steps
+    single = [f"{t:.5g}" for t, k in zip(times, jumps, strict=True) if k - 1 not in jumps]
+    found = f"; they jump at {', '.join(single)} s" if 0 < len(single) <= MOST_JUMPS else ""
+    return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}{found}"
