@@ -9,6 +9,8 @@ import numpy as np
 
 # Beyond these sizes [SI] squares and products overflow or vanish; nothing that moves comes near them.
 LARGEST, SMALLEST = 1e50, 1e-50
+# More steps would not fit into memory.
+MOST = 10_000_000
 
 
 def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative: bool = False) -> float:
@@ -61,12 +63,12 @@ def entries(value: Any) -> tuple | None:
     return tuple(value) if isinstance(value, (list, tuple, range)) else None
 
 
-def whole(name: str, value: Any, least: int = 1, most: int | None = None) -> int:
-    """`value` as a whole number of at least `least`, or a ValueError that names it."""
+def whole(name: str, value: Any, least: int = 1) -> int:
+    """`value` as a whole number of at least `least` that a computer can count to, or a ValueError."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}; got {short(value)}")
-    if most is not None and value > most:
-        raise ValueError(f"{name} must be at most {most:,}; got {short(value)}")
+    if value > MOST:
+        raise ValueError(f"{name} must be at most {MOST:,}; got {short(value)}")
     return int(value)
 
 

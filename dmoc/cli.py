@@ -85,7 +85,7 @@ def solve(
     plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
     guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
     starts: Annotated[
-        int, typer.Option(min=1, help="Guesses to try on a coarse mesh; the best optimum is refined.")
+        int, typer.Option(min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined.")
     ] = 1,
     as_json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,

@@ -125,10 +125,13 @@ def writable(path: Path | None, drawn: bool = False) -> None:
     """ValueError unless a file can be written there: said before the work, not after it."""
     if path is None:
         return
-    folder = path.parent
+    from dmoc.files import path_of
+
+    folder = path_of(path).parent
     if not folder.is_dir():
         raise ValueError(f"cannot write {path}: there is no folder {folder}; create it first")
-    if path.is_dir() or not os.access(folder, os.W_OK):
+    special = path.exists() and not path.is_file()
+    if special or not os.access(folder, os.W_OK):
         raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
     if drawn:
         from dmoc.plot import SUFFIXES

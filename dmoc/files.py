@@ -10,11 +10,16 @@ from pathlib import Path
 
 from dmoc.checks import short
 
+# Letters of a name; a temporary file beside it has a few more.
+LONGEST = 200
+
 
 def path_of(path: str | os.PathLike) -> Path:
     """A path, or a ValueError if it is none."""
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"a file is named by a text or a path; got {short(path)}")
+    if len(Path(path).name) > LONGEST:
+        raise ValueError(f"the name {short(str(path))} is too long for a file")
     return Path(path)
 
 
@@ -33,8 +38,8 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     target = path_of(path)
     if not target.parent.is_dir():
         raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
-    if target.is_dir():
-        raise ValueError(f"cannot write {target}: it is a folder; add a file name")
+    if target.exists() and not target.is_file():
+        raise ValueError(f"cannot write {target}: it is a folder, or no file; add a file name")
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield temporary

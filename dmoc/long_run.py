@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.boundary import State
-from dmoc.checks import entries, number, of_kind
+from dmoc.checks import entries, number, of_kind, whole
 from dmoc.effects.gravity import PointGravity
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map, weighted
@@ -146,7 +146,7 @@ def _fixed(
     name: str, count: float, dynamics: Dynamics, problem: TransferProblem, period: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Times [s], positions [m] and momenta per mass [m/s] on the way, and the seconds it took."""
-    n, steps = dynamics.dimension, max(round(count * duration / period), 2)
+    n, steps = dynamics.dimension, max(whole("steps", round(count * duration / period)), 2)
     times = problem.start_time + duration / steps * np.arange(steps + 1)
     position, velocity = problem.start.fixed()
     canonical = name.startswith("order ")

@@ -25,7 +25,9 @@ def study(
         typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Also without coarse meshes on the way.")] = False,
-    repeats: Annotated[int, typer.Option(min=1, help="How often each solve is timed; the median counts.")] = 3,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=1000, help="How often each solve is timed; the median counts.")
+    ] = 3,
     reference: Annotated[
         float | None, typer.Option(help="The true objective; order 8 on a fine mesh if not given.")
     ] = None,

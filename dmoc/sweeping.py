@@ -21,6 +21,9 @@ from dmoc.sweep_worker import Task
 if TYPE_CHECKING:
     from xarray import Dataset
 
+# More processes than any computer has use for.
+MOST_WORKERS = 4096
+
 
 def sweep(
     problem: str | os.PathLike,
@@ -101,8 +104,9 @@ def sweep(
     plan = make_plan(file, vary, sample, method, seed, fixed)
     if follow and plan.sampled:
         raise ValueError("a sample has no order in which to follow a branch; leave out follow, or use a grid")
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise ValueError(f"workers must be a whole number of at least 1; got {workers!r}")
+    wrong = isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS
+    if workers is not None and wrong:
+        raise ValueError(f"workers must be a whole number, 1 to {MOST_WORKERS}; got {workers!r}")
     numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold}
     facts = _facts(file, plan, fixed, numerics | {"follow": follow})
     if plan.sampled:

@@ -21,9 +21,6 @@ from dmoc.mesh import Guess, uniform_mesh
 from dmoc.problem import TransferProblem
 from dmoc.rows import values_of
 
-# More would not fit into the memory of any computer of today.
-MOST_STEPS = 10_000_000
-
 
 @dataclass(frozen=True)
 class Units:
@@ -218,7 +215,7 @@ def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units) -> NLP
 def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:
     """Step ends as fractions, from a number of steps or as given."""
     if mesh is None:
-        return uniform_mesh(whole("steps", steps, least=2, most=MOST_STEPS))
+        return uniform_mesh(whole("steps", steps, least=2))
     ends = np.array([number("mesh", end, "-") for end in entries(mesh) or ()])
     if ends.ndim != 1 or len(ends) < 3 or ends[0] != 0 or ends[-1] != 1 or not (np.diff(ends) > 0).all():
         raise ValueError(f"mesh must be at least 3 increasing fractions from 0 to 1; got {short(mesh)}")
