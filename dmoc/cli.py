@@ -103,7 +103,7 @@ def solve(
         start: Any = None if guess is None else dmoc.load(guess)
         unit = case.objective.unit_with(case.actuator)
         if starts > 1:
-            start = best_start(case, starts, order or 2, hold, start, None if as_json or quiet else unit)
+            start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
         with report.live_line(not (as_json or quiet), unit) as progress:
             solution = dmoc.solve(
                 case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress

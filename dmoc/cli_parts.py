@@ -60,7 +60,7 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
     return file, file.make(**values)
 
 
-def best_start(case: Any, starts: int, order: int, hold: bool, guess: Any, unit: str | None) -> Any:
+def best_start(case: Any, starts: int, order: int | None, hold: bool, guess: Any, unit: str | None) -> Any:
     """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
     from dmoc import report
     from dmoc.report_tables import optima_table

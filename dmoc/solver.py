@@ -86,20 +86,35 @@ def solve(
         tol = _tolerance(tol)
         with climb.interrupt:
             return climb_to_tolerance(climb, tol, order, steps, hold, guess)
+    first = first_guess(problem, order, steps, hold, guess, mesh)
+    with climb.interrupt:
+        climb.up_to(first, guess)
+    return climb.solution()
+
+
+def first_guess(
+    problem: TransferProblem,
+    order: int | None = None,
+    steps: int | None = None,
+    hold: bool = False,
+    guess: Any = None,
+    mesh: Any = None,
+) -> Guess:
+    """The guess on the last mesh; what is not given of order and steps is as the motion needs it."""
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
     first = starting_guess(problem, ends, order or 2, hold, guess)
+    if mesh is not None:
+        return first
     turns = angle_around(problem, first) / (2 * np.pi)
-    if mesh is None and steps is None and turns > MANY_TURNS:
+    if steps is None and turns > MANY_TURNS:
         # the error adds up from one revolution to the next
         order = order or (2 if hold else 6)
         steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
         first = starting_guess(problem, check_mesh(steps), order, hold, guess)
-    if mesh is None and is_uneven(problem, first):
+    if is_uneven(problem, first):
         order = order or (2 if hold else 4)
-        first = graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
-    with climb.interrupt:
-        climb.up_to(first, guess)
-    return climb.solution()
+        return graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
+    return first
 
 
 def _tolerance(value: Any) -> float:

@@ -101,11 +101,13 @@ SAMPLES_A_TURN, ROUNDS = 100, 5
 class Winding:
     """Revolutions from one state to another around one attractor; three axes, from the attractor.
 
-    The modified equinoctial elements p, f, g, h, k of M. J. H. Walker, Celestial Mechanics 36 (1985),
-    go from the one orbit to the other as the true longitude L grows, and the body moves as fast as on
-    the orbit of the moment. The number of revolutions is the one that takes about the duration, or so
-    many `more`; what is left goes into an earlier or later change of the orbit, and where that is not
-    enough into the pace.
+    The modified equinoctial elements of M. J. H. Walker, Celestial Mechanics 36 (1985), change as the
+    least effort changes them while the orbit is nearly a circle of speed V, averaged over a revolution.
+    The mean square of the thrust per unit mass is then (dV/dt)^2 + 2 V^2 (di/dt)^2 + 0.4 V^2 (de/dt)^2 (the
+    best thrust swings with the angle L: across as cos L, along and up as 2 cos L and sin L), so the
+    optimum is a straight line in polar coordinates, passed evenly. The body moves as fast as on the orbit
+    of the moment. The number of revolutions is the one that takes about the duration, or so many `more`;
+    what is left goes into an earlier or later change of the orbit, and if that is not enough into the pace.
     """
 
     mu: float
@@ -143,17 +145,16 @@ class Winding:
 
     @cached_property
     def bend(self) -> float:
-        """How much earlier the orbit changes than evenly."""
+        """How much earlier than evenly the orbit changes."""
         from scipy.optimize import brentq
 
-        def late(bend: float) -> float:
+        def excess(bend: float) -> float:
             return self._time(self.turns, bend) - self.duration
 
-        early, even = -MOST_BENT, late(0.0)
-        if late(-MOST_BENT) * late(MOST_BENT) < 0:
-            return float(brentq(late, -MOST_BENT, MOST_BENT, xtol=1e-6))
-        rising = late(MOST_BENT) > late(early)
-        return early if rising == (even > 0) else MOST_BENT
+        low, high = excess(-MOST_BENT), excess(MOST_BENT)
+        if low * high > 0:
+            return -MOST_BENT if abs(low) < abs(high) else MOST_BENT
+        return float(brentq(excess, -MOST_BENT, MOST_BENT, xtol=1e-6))
 
     def _time(self, turns: int, bend: float = 0.0) -> float:
         return float(self._times(turns, bend)[1][-1])
@@ -170,8 +171,34 @@ class Winding:
         """p, f, g, h, k of the moment, shape (5, count), and L, at fractions of the angle."""
         (first, begin), (last, end) = self._ends
         end = begin + (end - begin) % (2 * np.pi) + 2 * np.pi * turns
-        share = at + bend * at * (1 - at)
-        return first[:, None] * (1 - share) + last[:, None] * share, begin + at * (end - begin)
+        time = self._even(at)
+        speed, share = self._line(time + bend * time * (1 - time))
+        others = first[1:, None] + share * (last - first)[1:, None]
+        return np.concatenate([[speed**-2], others]), begin + at * (end - begin)
+
+    def _line(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Root of 1/p, and the share of the change of the other elements, at fractions of the time."""
+        (first, _), (last, _) = self._ends
+        fast, slow, angle = first[0] ** -0.5, last[0] ** -0.5, self._angle
+        x, y = fast + time * (slow * np.cos(angle) - fast), time * slow * np.sin(angle)
+        return np.hypot(x, y), np.arctan2(y, x) / angle if angle > 1e-6 else time
+
+    @cached_property
+    def _angle(self) -> float:
+        """What changes of e and of the plane cost as an angle between speeds, the costs of the two added."""
+        (first, _), (last, _) = self._ends
+        tilt = 4 * np.arctan(0.5 * np.linalg.norm(last[3:] - first[3:]))
+        return min(float(np.sqrt(0.4 * np.sum((last - first)[1:3] ** 2) + 2 * tilt**2)), 0.75 * np.pi)
+
+    @cached_property
+    def _even(self) -> Any:
+        """Fractions of the time at those of the angle: dL/dt = V^3/mu on a circle."""
+        from scipy.interpolate import CubicSpline
+
+        time = np.linspace(0.0, 1.0, SAMPLES_A_TURN + 1)
+        pace = self._line(time)[0] ** 3
+        angle = np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1])))
+        return CubicSpline(angle / angle[-1], time)
 
     @staticmethod
     def _radius(elements: np.ndarray, longitude: np.ndarray) -> np.ndarray:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from dmoc.climb import COARSEST_NODES, Climb
-from dmoc.coasting import center_of, lone_attractor
+from dmoc.coasting import center_of, lone_attractor, winding_path
 from dmoc.constraints import KeepOut
 from dmoc.guess import starting_guess
 from dmoc.mesh import Guess
 from dmoc.problem import TransferProblem
+from dmoc.solver import first_guess
 from dmoc.transcription import check_mesh
 
 # Objectives closer than this, relative, on paths closer than this part of the extent, are one optimum.
@@ -41,7 +42,7 @@ class Optimum:
 def local_optima(
     problem: TransferProblem,
     starts: int,
-    order: int = 2,
+    order: int | None = None,
     hold: bool = False,
     guess: Any = None,
     options: dict[str, Any] | None = None,
@@ -52,10 +53,10 @@ def local_optima(
     keep-out zones paths that bend around each on either side, then random bends. The same numbers
     are drawn every time.
     """
-    base = starting_guess(problem, check_mesh(COARSEST_NODES[True] // (order // 2)), order, hold, guess)
-    least = Climb(problem).least_steps(base)
-    if least > len(base.mesh) - 1:
-        base = starting_guess(problem, check_mesh(least), order, hold, guess)
+    base = first_guess(problem, order, None, hold, guess)
+    if order or base.order == 2:
+        steps = max(COARSEST_NODES[True] // (base.order // 2), Climb(problem).least_steps(base))
+        base = starting_guess(problem, check_mesh(steps), base.order, hold, guess)
     found: list[Optimum] = []
     for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
         climb = Climb(problem, options)
@@ -85,8 +86,11 @@ def _variants(problem: TransferProblem, base: Guess) -> Iterator[tuple[str, Gues
     lone = lone_attractor(problem)
     if lone is not None and problem.dimension > 1:
         center = center_of(lone, problem.dimension)
+        ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
         for turns in (1, -1, 2, -2):
-            position = center + _turned(base.position - center, turns * base.fractions)
+            position = winding_path(problem, base.duration, ends, base.fractions, turns)
+            if position is None:
+                position = center + _turned(base.position - center, turns * base.fractions)
             yield f"{turns:+d} revolutions", replace(base, position=position)
     for i, constraint in enumerate(problem.constraints):
         if isinstance(constraint, KeepOut):

@@ -86,7 +86,7 @@ MAY_IMPORT = {
     # what is shown: nothing above knows of it
     "library": "docstrings problem",
     "formulation": "ipopt mesh problem",
-    "starts": "BASICS NLP MOTION climb coasting constraints",
+    "starts": "BASICS NLP MOTION climb coasting constraints solver",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
     "doctor": "library solver",
     "report_tables": "EFFECTS doctor influence report solution starts",
