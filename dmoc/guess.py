@@ -78,7 +78,9 @@ def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
     squares = np.zeros(len(position))
     for attractor in attractors_of(problem):
         distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
-        squares += attractor.mu / np.maximum(distance, 1e-90) ** 3
+        # a node in the attractor itself asks for no steps: it is refused by name
+        outside = distance > 1e-6 * distance.max()
+        squares[outside] += attractor.mu / distance[outside] ** 3
     return np.sqrt(squares)
 
 

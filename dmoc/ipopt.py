@@ -72,7 +72,11 @@ def make_solver(
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.tol": tolerance,
         "ipopt.constr_viol_tol": 1e-6,
-        "ipopt.acceptable_iter": 0,
+        # where an optimum of nothing leaves a direction open, ten iterations that gain nothing are enough
+        "ipopt.acceptable_iter": 10,
+        "ipopt.acceptable_tol": 1e-6,
+        "ipopt.acceptable_constr_viol_tol": 1e-8,
+        "ipopt.acceptable_obj_change_tol": 1e-10,
         "ipopt.max_iter": 1000,
     }
     if nlp.problem.limited:

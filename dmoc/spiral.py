@@ -140,7 +140,9 @@ class Winding:
         """Whole revolutions beyond the angle between the ends."""
         turns = 10
         for _ in range(ROUNDS):
-            turns = max(round((turns + 1) * self.duration / self._time(turns)) - 1, 0)
+            # from a place to itself no revolution is no way at all
+            taken = self._time(turns) or self._time(turns + 1)
+            turns = max(round((turns + 1) * self.duration / taken) - 1, 0)
         return max(turns + self.more, 0)
 
     @cached_property

@@ -23,6 +23,7 @@ from dmoc import (
     KeepOut,
     LinearDrag,
     Objective,
+    Orbit,
     PointGravity,
     Spring,
     State,
@@ -132,6 +133,22 @@ def test_to_coast_costs_nothing(order):
     orbit = TransferProblem(1.0, here, here, 2 * np.pi, effects=[PointGravity(1.0)])
     # what is left is the error of the scheme, squared
     assert certified(orbit, order=order).objective < (1e-8 if order == 2 else 1e-20)
+
+
+ELLIPSE = Orbit(1.0, a=1.0, e=0.3, argp=0.0, center=(0, 0))
+PERIAPSIS = State((0.7, 0), (0, np.sqrt(1.3 / 0.7)))
+
+
+@pytest.mark.parametrize(
+    ("start", "duration"), [(PERIAPSIS, (3.0, 9.0)), (ELLIPSE, 6.0)], ids=["time", "places"]
+)
+def test_to_coast_is_found_soon_where_it_may_end_anywhere(start, duration):
+    """Along the orbit the effort hardly changes: without an end to that, thousands of iterations."""
+    coast = TransferProblem(1.0, start, ELLIPSE, duration, effects=[PointGravity(1.0)])
+    found = certified(coast)
+    assert found.objective < 1e-8 and found.iterations < 60
+    strict = {"ipopt.acceptable_iter": 0, "ipopt.max_iter": 100}
+    assert max(level.iterations for level in solve(coast, options=strict).ladder) == 100
 
 
 def test_no_thrust_costs_no_more_than_its_rounding():
