@@ -28,7 +28,7 @@ class _Around(Boundary):
     def with_dimension(self, dimension: int) -> Any:
         return replace(self, center=(0.0,) * dimension) if self.center is None else self  # type: ignore[type-var]
 
-    def _check_attractor(self, spatial: bool) -> None:
+    def _check_attractor(self, spatial: bool, size: float | None) -> None:
         name = type(self).__name__
         object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
         center = (0.0, 0.0, 0.0) if spatial and self.center is None else self.center
@@ -37,6 +37,12 @@ class _Around(Boundary):
             if len(center) == 1 or (spatial and len(center) == 2):
                 needed = "3 axes" if spatial else "2 or 3 axes"
                 raise ValueError(f"{name} needs {needed}; got center={center!r} with {len(center)}")
+            far = max(map(abs, center))
+            if size is not None and abs(size) < 1e4 * math.ulp(far):
+                raise ValueError(
+                    f"{name}: center is {far:g} m from the origin, where places {abs(size):g} m apart are the same "
+                    "number; put the origin nearer"
+                )
         object.__setattr__(self, "center", center)
 
     def _anywhere(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +96,7 @@ class CircularOrbit(_Around):
             if len(normal) != 3 or length == 0:
                 raise ValueError(f"CircularOrbit: normal must be a direction in space; got {self.normal!r}")
             object.__setattr__(self, "normal", tuple(x / length for x in normal))
-        self._check_attractor(spatial=self.normal is not None)
+        self._check_attractor(self.normal is not None, self.radius)
         object.__setattr__(self, "clockwise", flag("CircularOrbit: clockwise", self.clockwise))
         if self.clockwise and self.dimension == 3:
             raise ValueError("CircularOrbit: clockwise has no meaning in space; give normal=(0, 0, -1)")
@@ -185,7 +191,7 @@ class Orbit(_Around):
                 object.__setattr__(self, name, number(name, value, unit, nonnegative=name == "e"))
         if not self._given:
             raise ValueError("Orbit: every element is None; give at least one of " + ", ".join(ELEMENTS))
-        self._check_attractor(spatial=self.raan is not None or self.i not in (None, 0.0, math.pi))
+        self._check_attractor(self.raan is not None or self.i not in (None, 0.0, math.pi), self.a)
         self._check_elements()
 
     def _check_elements(self) -> None:
