@@ -40,8 +40,8 @@ class _Around(Boundary):
             far = max(map(abs, center))
             if size is not None and abs(size) < 1e4 * math.ulp(far):
                 raise ValueError(
-                    f"{name}: center is {far:g} m from the origin, where places {abs(size):g} m apart are the same "
-                    "number; put the origin nearer"
+                    f"{name}: center is {far:g} m from the origin, where places {abs(size):g} m apart are "
+                    "the same number; put the origin nearer"
                 )
         object.__setattr__(self, "center", center)
 
