@@ -25,7 +25,7 @@ PARTS, SHORTEST = 4, 1e-5
 # A control within this share of its span of a limit is at the limit; so many nodes between make an arc.
 BETWEEN = 0.05
 # More switches than this are not listed.
-MOST_JUMPS = 12
+MOST_SWITCHES = 12
 # By how much the error falls from mesh to mesh, at least.
 LEAST_FALL = 1.5
 TINY = float(np.finfo(float).tiny)
@@ -53,15 +53,18 @@ def climb_to_tolerance(
         return climb.solution(tolerance=tol)
     while True:
         path, objective = climb.path, climb.levels[-1].objective
-        parts = np.full(len(path.mesh) - 1, 2)
+        # the error where a control jumps falls with the length of the step there alone, here halved
+        parts, most = np.full(len(path.mesh) - 1, 2), 2.0
         if local:
             wanted = max(longest / PARTS ** (len(changes) + 1), SHORTEST)
             errors = local_errors(climb.dynamics, path, problem.start_time)
-            parts = _parts(path, errors, _corners(problem, path, objective), wanted)
+            corners = _corners(problem, path, objective)
+            parts = _parts(path, errors, corners, wanted)
+            most = PARTS - 1.0 if len(corners) else 2.0 ** (2 if hold else order)
         if not climb.solve_on(path.onto(_cut(path.mesh, parts), order, hold)):
             return climb.solution(tolerance=tol)
         changes.append(_change((path, objective), (climb.path, climb.levels[-1].objective), parts))
-        error = estimate(climb, changes, 2 if hold else order)
+        error = estimate(climb, changes, most)
         rounded = rounding_cost(problem, climb.path) / max(abs(climb.levels[-1].objective), TINY)
         # what the rounding of |F| costs counts, but no mesh brings it down
         met = error.largest <= tol
@@ -105,19 +108,32 @@ def _best_order(problem: TransferProblem, path: Guess, objective: float, tol: fl
 
 
 def _is_singular(problem: TransferProblem, path: Guess) -> bool:
-    """Whether the cost is linear in controls that are between their limits for longer than a switch takes.
+    """Whether controls that the cost is linear in stay between their limits for longer than a switch takes.
 
     On such arcs a control at the inner nodes of a step is not determined, and wanders.
     """
+    share = _shares(problem, path)
+    between = np.any((share > BETWEEN) & (share < 1 - BETWEEN), axis=1)
+    return bool((between[1:-1] & between[:-2] & between[2:]).mean() > BETWEEN)
+
+
+def switch_times(problem: TransferProblem, path: Guess) -> np.ndarray:
+    """When a control that the cost is linear in passes the middle between its limits [s]."""
+    fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
+    above = _shares(problem, path) - 0.5
+    node, column = np.nonzero(np.diff(above > 0, axis=0))
+    before, after = above[node, column], above[node + 1, column]
+    at = fractions[node] + before / (before - after) * (fractions[node + 1] - fractions[node])
+    return problem.start_time + path.duration * np.sort(at)
+
+
+def _shares(problem: TransferProblem, path: Guess) -> np.ndarray:
+    """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
     u = ca.SX.sym("u", path.control.shape[1])
     rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
-    lower, upper = problem.actuator.bounds(problem.dimension)
-    limited = np.isfinite(np.asarray(upper) - np.asarray(lower))
-    if ca.hessian(rate, u)[0].nnz() or not limited.any():
-        return False
-    share = (path.control - lower)[:, limited] / (np.asarray(upper) - lower)[limited]
-    between = ((share > BETWEEN) & (share < 1 - BETWEEN)).any(axis=1)
-    return bool((between[1:-1] & between[:-2] & between[2:]).mean() > BETWEEN)
+    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
+    limited = np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
+    return (path.control - lower)[:, limited] / (upper - lower)[limited]
 
 
 def _corners(problem: TransferProblem, path: Guess, objective: float) -> np.ndarray:
@@ -139,7 +155,9 @@ def _corners(problem: TransferProblem, path: Guess, objective: float) -> np.ndar
             share[[0, -1]] = 0.0
         if len(share) > steps:
             share = share[step_nodes(steps, scheme(path.order))].max(axis=0)
-        found.append(np.flatnonzero(np.diff(share > 1e-6 * abs(objective))))
+        # what the barrier leaves beside a limit that acts is no part of it
+        acts = (share > 1e-6 * abs(objective)) & (share > 1e-3 * share.max())
+        found.append(np.flatnonzero(np.diff(acts)))
     return np.unique(np.concatenate(found))
 
 
@@ -173,15 +191,15 @@ def _change(coarse: tuple[Guess, float], fine: tuple[Guess, float], parts: np.nd
     return max(float(moved) / path_scales(fine[0])[0], stretched), abs(fine[1] - coarse[1]) / scale
 
 
-def estimate(climb: Climb, changes: list[tuple[float, float]], claimed: int) -> Error:
+def estimate(climb: Climb, changes: list[tuple[float, float]], most: float) -> Error:
     """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
 
     Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
-    f is the fall of the last two changes, at most that of the scheme; where there is one, of half its order.
+    f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
     """
     problem, path = climb.problem, climb.path
-    fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else 2 ** (claimed / 2)
-    moved, cost = (change / (min(max(fall, LEAST_FALL), 2**claimed) - 1) for change in changes[-1])
+    fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
+    moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
     extent, speed = path_scales(path)
     position, velocity = reference(climb.dynamics, path, problem.start_time, path.start_velocity)
     miss = np.linalg.norm(position - path.position[-1]) / extent
@@ -254,10 +272,15 @@ def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
 
 
 def _words(problem: TransferProblem, path: Guess, reason: str) -> str:
-    """Such as: order 4, 145 steps: controls switch or limits set in; at 0.06, 4.45 s."""
-    jumps = control_jumps(problem, path)
-    times = problem.start_time + path.duration * 0.5 * (path.mesh[jumps] + path.mesh[jumps + 1])
-    # a jump may take two steps
-    single = [f"{t:.5g}" for t, k in zip(times, jumps, strict=True) if k - 1 not in jumps]
-    found = f"; they jump at {', '.join(single)} s" if 0 < len(single) <= MOST_JUMPS else ""
+    """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
+    times = switch_times(problem, path)
+    # several within two steps of each other are one burn that this mesh does not resolve
+    near = (
+        2
+        * path.duration
+        * np.interp(times - problem.start_time, path.duration * path.mesh[:-1], np.diff(path.mesh))
+    )
+    groups = np.split(times, np.flatnonzero(np.diff(times) > near[:-1]) + 1)
+    words = [f"{g[0]:.5g}" + f" to {g[-1]:.5g}" * (len(g) > 1) for g in groups if len(g)]
+    found = f"; switches at {', '.join(words)} s" if 0 < len(words) <= MOST_SWITCHES else ""
     return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}{found}"

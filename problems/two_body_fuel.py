@@ -32,6 +32,6 @@ def problem(
         goal=State((1, 0, 0), (0.01, 1.1, 0)),
         duration=duration,
         effects=[PointGravity(mu=1.0)],
-        actuator=Engine(thrust, exhaust_velocity=exhaust_velocity),
+        actuator=Engine(thrust, exhaust_velocity=exhaust_velocity, smoothing=2e-6),
         objective=Fuel(),
     )
