@@ -90,8 +90,7 @@ TABLE = (
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )
 NOTES = """
-(1) Half of the difference is the mesh, half the rounding of |F| at zero (`Engine.smoothing`); with 400 steps
-and a rounding of 1e-7 it is 5e-6. The published final mass, 0.919694 kg against 0.923219, is for ten segments
+(1) The difference is the mesh, but for 2e-6 that the rounding of |F| at zero (`Engine.smoothing`) costs. The published final mass, 0.919694 kg against 0.923219, is for ten segments
 of constant thrust; with 20 and 40 of them it is 0.92222 and 0.92292. (2) Without air and oblateness. Two
 impulses bound the fuel; between orbits so close long burns cost no more, and finer meshes tend to the bound.
 (3) Forward-backward shooting; the published 0.946927 (pykep 3) is for 20 segments from one random start. Of
