@@ -261,6 +261,24 @@ def test_a_guess_past_the_middle_keeps_its_side():
         assert side * found.position[len(found.position) // 2, 1] > 0.9
 
 
+# no way in or out
+
+
+def test_a_goal_inside_a_zone_says_how_deep_and_one_per_cent_further_is_solved():
+    def to(y):
+        zones = [KeepOut((9, 9), 1), KeepOut((4, 0), 1)]
+        return rest_to_rest((4.0, y), 4.0, constraints=zones)
+
+    with pytest.raises(
+        ValueError, match=r"goal breaks KeepOut \(constraint 2\) by 0\.3 m.*move the goal"
+    ) as refusal:
+        to(0.7)
+    depth = float(str(refusal.value).split(" by ")[1].split(" m")[0])
+    certified(to(0.7 + 1.01 * depth))
+    with pytest.raises(ValueError, match="constraint 2"):
+        to(0.7 + 0.97 * depth)
+
+
 # where a force has no value
 
 
