@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.diagnose import Cause, cause_of
 from dmoc.faults import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
-from dmoc.guess import starting_guess
+from dmoc.guess import angle_around, starting_guess
 from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
@@ -25,6 +25,8 @@ from dmoc.tube import in_tube, out_of_tube
 # iterations, and where there are none. Without, 400 nodes take no longer than 100 and 400 after them.
 COARSEST_NODES, FINER = {True: 100, False: 400}, {True: 4, False: 16}
 MOST_COARSE = 400
+# Steps of order 2 over the number of revolutions to the power 1.5, for a phase that is roughly right.
+IN_PHASE = 50
 WIDEST_ROUNDING = 1e-2
 # How far beyond its limits a transfer on a coarse mesh is given up for good, and up to how many nodes it is
 # worth while to find out: the error of the coarse mesh is far below the one, the time small up to the other.
@@ -51,9 +53,13 @@ class Climb:
     """The last NLP and its answer, and every level so far, of one problem."""
 
     def __init__(
-        self, problem: TransferProblem, options: dict[str, Any] | None = None, progress: Progress | None = None
+        self,
+        problem: TransferProblem,
+        options: dict[str, Any] | None = None,
+        progress: Progress | None = None,
+        compiled: bool = False,
     ):
-        self.problem, self.options, self.progress = problem, options, progress
+        self.problem, self.options, self.progress, self.compiled = problem, options, progress, compiled
         self.dynamics = Dynamics.of(problem)
         self.interrupt = Interrupt()
         self.levels: list[Level] = []
@@ -139,7 +145,7 @@ class Climb:
             self.answer = replace(self.answer, status="stopped")
             return False
         begun = time.perf_counter()
-        self.nlp = transcribe_onto(problem, guess, units_of(problem, guess))
+        self.nlp = transcribe_onto(problem, guess, units_of(problem, guess), self.compiled)
         if not self.levels:
             refuse_undefined_rows(self.nlp, problem, guess)
         watch = Watch(self.nlp, self.progress, self.interrupt)
@@ -165,12 +171,14 @@ class Climb:
         """Meshes from coarse to the final one.
 
         The coarsest has 100 or 400 nodes, or as many as keep h omega below 1 on the guess: a mesh that
-        cannot follow the motion has optima of its own.
+        cannot follow the motion has optima of its own. Over many revolutions that takes more: its error
+        in the phase adds up.
         """
         final, limited = first.mesh, self.problem.limited
         counts, least = [len(final) - 1], COARSEST_NODES[limited] // (first.order // 2)
         if counts[0] > 2 * least:
-            least = max(least, self.least_steps(first))
+            turns = angle_around(self.problem, first) / (2 * np.pi) if first.order == 2 else 0.0
+            least = max(least, self.least_steps(first), int(IN_PHASE * turns**1.5))
         while counts[-1] > 2 * least:
             counts.append(max(least, -(-counts[-1] // FINER[limited])))
         places = np.linspace(0.0, 1.0, len(final))

@@ -125,7 +125,7 @@ def winding_path(
     if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
         return None
     winding = Winding(attractor.mu, duration, start, goal, more)
-    if winding.eccentricity > MOST_ECCENTRIC or winding.turns - more < MANY_TURNS or not (more or winding.fits):
+    if winding.eccentricity > MOST_ECCENTRIC or winding.turns - more < MANY_TURNS:
         return None
     n = problem.dimension
     return winding.positions(fractions)[:, :n] + center_of(attractor, n)

@@ -130,11 +130,6 @@ class Winding:
         """The larger of the two ends'."""
         return max(float(np.hypot(*elements[1:3])) for elements, _ in self._ends)
 
-    @property
-    def fits(self) -> bool:
-        """Whether the motion takes the duration without a change of its pace."""
-        return abs(self.bend) < MOST_BENT
-
     @cached_property
     def turns(self) -> int:
         """Whole revolutions beyond the angle between the ends."""
@@ -153,9 +148,8 @@ class Winding:
         def excess(bend: float) -> float:
             return self._time(self.turns, bend) - self.duration
 
-        low, high = excess(-MOST_BENT), excess(MOST_BENT)
-        if low * high > 0:
-            return -MOST_BENT if abs(low) < abs(high) else MOST_BENT
+        if excess(-MOST_BENT) * excess(MOST_BENT) > 0:
+            return min(0.0, -MOST_BENT, MOST_BENT, key=lambda bend: abs(excess(bend)))
         return float(brentq(excess, -MOST_BENT, MOST_BENT, xtol=1e-6))
 
     def _time(self, turns: int, bend: float = 0.0) -> float:

@@ -17,7 +17,9 @@ which that makes the revolutions wanted, 2 pi n = integral of V^3/mu dt. (At con
 sign that switches twice a revolution, pi/2 stands for sqrt(2): T. N. Edelbaum, Propulsion requirements
 for controllable satellites, ARS Journal 31 (1961).)
 
-Optimum at the defaults: ??? N^2 s, ??? of that limit.
+Optimum at the defaults: 3728452.0 N^2 s, 0.99978 of that limit (400 steps of order 8); 0.9962 of it for
+five revolutions, 0.9991 for ten, 0.99995 for forty; in the plane 1.0065 for five and 1.0004 for twenty.
+At order 2 the same takes 13,000 steps: phase errors add up.
 """
 
 import math
@@ -30,13 +32,9 @@ MU, SLOT = 3.986004418e14, 42164170.0
 def limit(revolutions: float, radius: float, inclination: float) -> tuple[float, float]:
     """Duration [s] and D [m/s] as the revolutions become many."""
     fast, slow, angle = math.sqrt(MU / radius), math.sqrt(MU / SLOT), math.sqrt(2) * inclination
-    change = math.hypot(fast - slow * math.cos(angle), slow * math.sin(angle))
-    shares = [(k + 0.5) / 1000 for k in range(1000)]
-    speeds = [
-        math.hypot(fast + x * (slow * math.cos(angle) - fast), x * slow * math.sin(angle)) for x in shares
-    ]
-    mean = sum(speed**3 for speed in speeds) / len(speeds)
-    return 2 * math.pi * revolutions * MU / mean, change
+    x, y = (slow * math.cos(angle) - fast) / 1000, slow * math.sin(angle) / 1000
+    mean = sum(math.hypot(fast + x * (k + 0.5), y * (k + 0.5)) ** 3 for k in range(1000)) / 1000
+    return 2 * math.pi * revolutions * MU / mean, 1000 * math.hypot(x, y)
 
 
 def problem(

@@ -87,6 +87,8 @@ TABLE = (
     Reference("goddard", "height", 1.012836918, COPS, (2, 400), 1e-6),
     Reference("two_body_fuel", "fuel", 0.0767810993, "indirect shooting (1)", (4, 200), 1e-4),
     Reference("leo_raise", "fuel", 6.6210851417, "closed form, two impulses (2)", (4, 50), 1e-4, NO_AIR),
+    Reference("dionysus", "mass", 2718.34, "example of ASSET", (6, 400), 5e-5, unit="kg"),
+    Reference("geo_raise", "effort", 3729263.1, "limit of many revolutions (4)", (6, 400), 3e-4),
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )
 NOTES = """
@@ -95,6 +97,7 @@ published final mass, 0.919694 kg against 0.923219, is for ten segments of const
 them it is 0.92222 and 0.92292. (2) Without air and oblateness. Two impulses bound the fuel; between orbits so close long burns cost no more, and finer meshes tend to the bound.
 (3) Forward-backward shooting; the published 0.946927 (pykep 3) is for 20 segments from one random start. Of
 fourteen starts six end there or near, most at this transfer, which is 0.98420 with 20 segments.
+(4) m² D² / (2 T), a closed form for circles; five, ten and twenty revolutions differ by 4e-3, 9e-4 and 2e-4.
 """
 
 
