@@ -15,6 +15,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from dmoc.compiled import compiled
+
 # How many entries that belong to one place are picked one by one; more are added up as a whole.
 MOST_PICKED = 8
 
@@ -64,6 +66,11 @@ class Kernel:
         return {
             kind: ca.Function(f"{self.name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()
         }
+
+    @cached_property
+    def compiled(self) -> dict[str, ca.Function]:
+        """The functions as machine code where that can be had."""
+        return compiled(self.functions)
 
     @cached_property
     def slope(self) -> ca.Function:
@@ -123,11 +130,12 @@ def assemble(
     row_scale: np.ndarray,
     cost_scale: float,
     parameter_count: int,
+    compiled: bool = False,
 ) -> Assembly:
     """Map the blocks and scatter them.
 
     Unknowns are `column_scale` times x, constraint i is `row_scale[i]` times its rows' sum, the
-    objective `cost_scale` times the sum of the costs.
+    objective `cost_scale` times the sum of the costs. With `compiled` the kernels are machine code.
     """
     columns, rows = len(column_scale), len(row_scale)
     x, p = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
@@ -148,7 +156,8 @@ def assemble(
             "jacobian": _jacobian_entries(block, weight, scale, rows),
             "hessian": _hessian_entries(block, scale, columns),
         }
-        for kind, function in block.kernel.functions.items():
+        functions = block.kernel.compiled if compiled else block.kernel.functions
+        for kind, function in functions.items():
             # an output that is empty or structurally zero is not worth a map
             if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and block.kernel.cost.is_zero()):
                 continue

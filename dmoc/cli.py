@@ -88,6 +88,10 @@ def solve(
         int, typer.Option(min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined.")
     ] = 1,
     as_json: Json = False,
+    compiled: Annotated[
+        bool,
+        typer.Option("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,
 ) -> None:
     """Solve a problem, check the answer, show both."""
@@ -105,9 +109,8 @@ def solve(
         if starts > 1:
             start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
         with report.live_line(not (as_json or quiet), unit) as progress:
-            solution = dmoc.solve(
-                case, order=order, steps=steps, tol=tol, hold=hold, guess=start, progress=progress
-            )
+            numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold, "compiled": compiled}
+            solution = dmoc.solve(case, guess=start, progress=progress, **numerics)
         verdict = verify(solution) if solution.success else None
     if out is not None:
         solution.save(out, source_hash=file.source_hash)

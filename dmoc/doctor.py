@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -13,12 +12,12 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
+from dmoc.compiled import compiler
 from dmoc.library import load_problem
 from dmoc.solver import solve
 
 PACKAGES = ("dmoc", "casadi", "numpy", "scipy", "matplotlib", "xarray", "h5netcdf", "h5py", "typer", "rich")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "pardisomkl", "spral", "wsmp")
-COMPILERS = ("cc", "gcc", "clang")
 BENCHMARK, MESHES = "orbit_raise", ((2, 400), (8, 25))
 
 # A library that fails to load writes to the terminal, and a broken one may end its process: try it in another.
@@ -76,7 +75,7 @@ def examine(seconds: float = 5.0) -> Findings:
         versions=known,
         system=f"{platform.system()} {platform.machine()}",
         cores=usable_cores(),
-        compiler=next(filter(None, map(shutil.which, COMPILERS)), None),
+        compiler=compiler(),
         linear_solvers=solvers,
         timings=tuple(benchmark(order, steps, share) for order, steps in MESHES) if seconds else (),
     )

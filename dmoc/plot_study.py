@@ -12,7 +12,7 @@ import numpy as np
 from dmoc.files import path_of, whole_file
 from dmoc.plot import SUFFIXES
 from dmoc.plot_style import DARK, SETTINGS
-from dmoc.study import Trial
+from dmoc.study import COLD, COMPILED, Trial
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -85,7 +85,7 @@ def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple
     """Draw curves; where each ends, with its name and colour."""
     axes.set_xscale("log")
     axes.set_yscale("log")
-    others = [name for name in curves if name.removesuffix(", cold") not in COLOURS]
+    others = [name for name in curves if name.removesuffix(COLD).removesuffix(COMPILED) not in COLOURS]
     ends = []
     for name, points in curves.items():
         x, y = np.array(points).T
@@ -115,11 +115,11 @@ def _style(name: str, others: list[str]) -> dict[str, Any]:
             "marker": MARKERS[i % len(MARKERS)],
             "linewidth": 1.4,
         }
-    cold = name.endswith(", cold")
-    colour = COLOURS[name.removesuffix(", cold")]
+    cold, compiled = name.endswith(COLD), name.endswith(COMPILED)
+    colour = COLOURS[name.removesuffix(COLD).removesuffix(COMPILED)]
     return {
         "color": colour,
-        "linestyle": ":" if cold else "-",
+        "linestyle": ":" if cold else "--" if compiled else "-",
         "marker": "o",
         "markerfacecolor": "white" if cold else colour,
         "linewidth": 1.6 if cold else 2.4,

@@ -85,7 +85,7 @@ def findings_table(found: Findings) -> RenderableType:
             ("versions", [f"{name} {version}" for name, version in found.versions.items()]),
             ("system", f"{found.system}, {found.cores} cores that may be used"),
             ("linear solvers", [f"{', '.join(works) or 'none'} in Ipopt", f"not here: {', '.join(fails)}"]),
-            ("C compiler", found.compiler or "none found; only code from dmoc export needs one"),
+            ("C compiler", found.compiler or "none found; only --compiled and code from dmoc export need one"),
             ("orbit_raise", milliseconds),
         ]
     )

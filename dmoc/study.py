@@ -29,6 +29,7 @@ from dmoc.transcription import check_mesh
 STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 48, 96), 8: (8, 16, 32, 64)}
 OTHER_STEPS = (25, 50, 100, 200, 400)
 REFERENCE_STEPS = 100
+COLD, COMPILED = ", cold", ", compiled"
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
 
 
@@ -39,7 +40,8 @@ class Trial:
     Attributes
     ----------
     method : str
-        "order 2" to "order 8" are dmoc's own, with ", cold" if without coarse meshes on the way.
+        "order 2" to "order 8" are dmoc's own, with ", cold" if without coarse meshes on the way
+        and ", compiled" if with functions as machine code.
     order : int or None
         None for other methods.
     steps, nodes : int
@@ -89,6 +91,7 @@ def work_precision(
     against: Mapping[str, Method] | Sequence[tuple[str, Method]] = (),
     reference: float | None = None,
     cold: bool = False,
+    compiled: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> list[Trial]:
     """Solve a problem at several orders on several meshes, and measure error and time.
@@ -112,6 +115,8 @@ def work_precision(
         The true objective; by default that of order 8 on a fine mesh.
     cold : bool
         Also solve each mesh at each order from the starting guess alone.
+    compiled : bool
+        Also solve each with functions as machine code, see `solve`.
     progress : callable
         Called before every solve with what it is.
 
@@ -128,14 +133,15 @@ def work_precision(
         raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
     meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
     others = dict(against)
+    variants = [("", True), *([(COLD, False)] if cold else []), *([(COMPILED, True)] if compiled else [])]
     runs: list[tuple[tuple, Callable[[], Run]]] = [
         (
-            (name + ("" if climbs else ", cold"), order, count, climbs),
-            partial(_own, problem, order, count, climbs),
+            (name + variant, order, count, climbs),
+            partial(_own, problem, order, count, climbs, variant == COMPILED),
         )
         for order, (name, counts) in zip(orders, meshes.items(), strict=True)
         for count in counts
-        for climbs in ((True, False) if cold else (True,))
+        for variant, climbs in variants
     ]
     runs += [
         ((name, None, count, False), partial(solve_other, problem, name, others[name], count))
@@ -227,12 +233,12 @@ def _when(points: list[Trial], target: float) -> float | None:
     return None
 
 
-def _own(problem: TransferProblem, order: int, steps: int, climbs: bool) -> Run:
+def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compiled: bool = False) -> Run:
     """One of dmoc's own solves, by way of coarser meshes or not."""
 
     def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
         begun = time.perf_counter()
-        climb = Climb(problem, options)
+        climb = Climb(problem, options, compiled=compiled)
         first = starting_guess(problem, uniform_mesh(steps), order, False)
         climb.up_to(first) if climbs else climb.solve_on(first)
         return climb.solution(), time.perf_counter() - begun

@@ -25,6 +25,9 @@ def study(
         typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
     ] = None,
     cold: Annotated[bool, typer.Option("--cold", help="Also without coarse meshes on the way.")] = False,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="Also with functions as machine code, once they are compiled.")
+    ] = False,
     repeats: Annotated[
         int, typer.Option(min=1, max=1000, help="How often each solve is timed; the median counts.")
     ] = 3,
@@ -58,7 +61,7 @@ def study(
         case = load_problem(problem).make(**parse_settings(settings or ()))
         methods = {} if against is None else load_methods(against)
         told = live.update if live else None
-        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold, told)
+        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
         save_study(trials, plot, f"{case.name.replace('_', ' ')}: what accuracy costs in time")
     if csv is not None:

@@ -191,13 +191,13 @@ def transcribe(
     return transcribe_onto(problem, start, units_of(problem, start))
 
 
-def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units) -> NLP:
+def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units, compiled: bool = False) -> NLP:
     """The NLP on the mesh, order and kind of control of a guess."""
     rule = scheme(guess.order)
     script = Transcript(problem, rule, guess.hold, guess.mesh, units)
     columns, rows = script.columns, script.rows
     size = int(script.parameters.numel())
-    assembly = assemble(script.blocks, columns.scales(), rows.scales(), 1 / units.cost, size)
+    assembly = assemble(script.blocks, columns.scales(), rows.scales(), 1 / units.cost, size, compiled)
     return NLP(
         problem,
         script.dynamics,

@@ -32,6 +32,7 @@ MAY_IMPORT = {
     "checks": "",
     "docstrings": "",
     "files": "checks",
+    "compiled": "",
     "kept": "",
     "layout": "",
     "lobatto": "checks",
@@ -56,7 +57,7 @@ MAY_IMPORT = {
     # the discrete equations, which know nothing of a transfer
     "mechanics": "actuators effects.base kept lobatto",
     "mesh": "lobatto",
-    "assembly": "",
+    "assembly": "compiled",
     # motion forward in time; the guess and the refinement may use it
     "reference": "kept lobatto mechanics mesh",
     "simulation": "checks kept lobatto mechanics mesh problem reference",
@@ -88,7 +89,7 @@ MAY_IMPORT = {
     "formulation": "ipopt mesh problem",
     "starts": "BASICS NLP MOTION climb coasting constraints solver",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
-    "doctor": "library solver",
+    "doctor": "compiled library solver",
     "report_tables": "EFFECTS doctor influence report solution starts",
     "study": "BASICS NLP MOTION ANSWER formulation",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
