@@ -94,7 +94,8 @@ TABLE = (
 NOTES = """
 (1) The difference is the mesh, but for 2e-6 that the rounding of |F| at zero (`Engine.smoothing`) costs. The
 published final mass, 0.919694 kg against 0.923219, is for ten segments of constant thrust; with 20 and 40 of
-them it is 0.92222 and 0.92292. (2) Without air and oblateness. Two impulses bound the fuel; between orbits so close long burns cost no more, and finer meshes tend to the bound.
+them it is 0.92222 and 0.92292. (2) Without air and oblateness. Two impulses bound the fuel; between orbits so
+close long burns cost no more, and finer meshes tend to the bound.
 (3) Forward-backward shooting; the published 0.946927 (pykep 3) is for 20 segments from one random start. Of
 fourteen starts six end there or near, most at this transfer, which is 0.98420 with 20 segments.
 (4) m² D² / (2 T), a closed form for circles; five, ten and twenty revolutions differ by 4e-3, 9e-4 and 2e-4.
