@@ -37,9 +37,9 @@ class _Tube(Constraint):
 def in_tube(problem: TransferProblem, guess: Guess) -> TransferProblem | None:
     """The problem with a tube around a guess, where that helps: limited forces, many revolutions.
 
-    From a guess alone Ipopt's first steps go far; over many revolutions that leads to places from
-    which it takes hundreds of iterations to come back, or to another optimum. Within 0.4 of the distance
-    from the attractor 12 of 12 starts of `dionysus` converged, without 5 of 16.
+    From a guess alone Ipopt's first steps go far; over many revolutions that leads to places from which it
+    takes a thousand iterations to come back, or to another optimum. Of 16 guesses and meshes of `dionysus`
+    5 converged within 300 iterations without the tube, all 12 that were tried with it in 80.
     """
     attractor = lone_attractor(problem)
     if attractor is None or problem.constraints or problem.actuator.force_limit() is None:
