@@ -56,12 +56,18 @@ def figure(data: Dataset) -> Figure:
     from matplotlib.figure import Figure
 
     objective = result(data, "objective")
+    sampled = objective.dims[0] not in data.indexes
+    if sampled and len(data.coords) == 1:
+        # a sample of one parameter is a curve like any other
+        name = next(iter(data.coords))
+        data, sampled = data.swap_dims({objective.dims[0]: name}).sortby(name), False
+        objective = result(data, "objective")
     front = front_axes(data)
     alone = front is None or is_front_itself(data, front)
     with matplotlib.rc_context(SETTINGS):
         page = Figure(figsize=(9.0, 6.2) if alone else (13.33, 6.2), layout="constrained")
         panels = page.subplots(1, 1 if alone else 2, squeeze=False)[0]
-        if "sample" in objective.dims or "sample_" in objective.dims:
+        if sampled:
             _draw_cloud(panels[0], data, list(data.coords))
         elif objective.ndim == 1:
             _draw_curve(panels[0], data, front is not None and alone)
@@ -146,24 +152,18 @@ def _draw_map(axes: Any, data: Dataset) -> None:
 
 
 def _draw_cloud(axes: Any, data: Dataset, names: list) -> None:
-    """The points of a sample over the first two parameters, or the objective over the only one."""
+    """The points of a sample over the first two parameters."""
     objective, solved = result(data, "objective"), result(data, "success").values
     place = along(axes.xaxis, data, names[0])
     size, unit = readable(objective.values, unit_of(objective))
     values, words = objective.values / size, f"{_kind(objective)} [{pretty(unit)}]"
-    if len(names) == 1:
-        axes.plot(place, values, "o", color=PATH, markersize=4)
-        axes.set_ylabel(words)
-        if wide(values):
-            axes.set_yscale("log")
-    else:
-        height = along(axes.yaxis, data, names[1])
-        style = {"c": values[solved], "norm": _norm(values), "cmap": "viridis", "s": 45}
-        dots = axes.scatter(place[solved], height[solved], **style)
-        axes.plot(place[~solved], height[~solved], "x", color=WARNING, label="not solved")
-        axes.figure.colorbar(dots, ax=axes, label=words)
-        if not solved.all():
-            axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12))
+    height = along(axes.yaxis, data, names[1])
+    style = {"c": values[solved], "norm": _norm(values), "cmap": "viridis", "s": 45}
+    dots = axes.scatter(place[solved], height[solved], **style)
+    axes.plot(place[~solved], height[~solved], "x", color=WARNING, label="not solved")
+    axes.figure.colorbar(dots, ax=axes, label=words)
+    if not solved.all():
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12))
     axes.set_title(_title(objective))
 
 

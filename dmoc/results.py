@@ -233,10 +233,8 @@ def _dimensions(solution: Solution, kind: str, shape: tuple[int, int]) -> tuple[
 
 
 def _refuse_what_is_no_netcdf(file: Path) -> None:
-    if not file.exists():
-        raise ValueError(f"{file} does not exist; {WRITTEN_BY}")
     if not file.is_file():
-        raise ValueError(f"{file} is not a file; {WRITTEN_BY}")
+        raise ValueError(f"{file} {'is not a file' if file.exists() else 'does not exist'}; {WRITTEN_BY}")
     try:
         with open(file, "rb") as stream:
             head = stream.read(len(HDF5_SIGNATURE))
@@ -267,6 +265,8 @@ def _one_line(error: Exception) -> str:
 
 def _refuse_other_formats(file: Path, facts: dict[str, Any]) -> None:
     version = facts.get("format_version")
+    if facts.get("format") == "dmoc sweep":
+        raise ValueError(f"{file} is the result of a sweep; draw it with: dmoc plot {file}")
     if facts.get("format") != FORMAT or not isinstance(version, (int, np.integer)):
         raise ValueError(f"{file} is netCDF but not a result of dmoc; {WRITTEN_BY}")
     if version > FORMAT_VERSION:

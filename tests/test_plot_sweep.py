@@ -5,6 +5,7 @@ import pytest
 import xarray
 from sweeps import FAILED, found, plan_of
 
+import dmoc
 from dmoc.cli import main
 from dmoc.plot_front import pareto
 from dmoc.plot_sweep import figure, save_sweep
@@ -30,6 +31,15 @@ def test_one_parameter_is_a_curve_with_failures_marked(tmp_path):
     by_label = {line.get_label(): line for line in axes.get_lines()}
     assert np.nanmin(by_label["solved"].get_ydata()) == 1 and len(by_label["not solved"].get_xdata()) == 3
     assert axes.get_ylabel() == "effort [N\u00b2 s]"
+
+
+def test_a_sample_of_one_parameter_is_a_curve_in_order():
+    data = picture(plan_of(8, sampled=True), lambda at: None if at["p0"] > 6 else 1 + at["p0"] ** 2)
+    (axes,) = figure(data).axes
+    by_label = {line.get_label(): line for line in axes.get_lines()}
+    x, y = by_label["solved"].get_data()
+    assert (np.diff(x) > 0).all() and (np.diff(y[np.isfinite(y)]) > 0).all()
+    assert len(by_label["not solved"].get_xdata()) == np.isnan(y).sum()
 
 
 def test_two_parameters_are_a_map_with_failures_hatched(tmp_path):
@@ -81,3 +91,6 @@ def test_other_files_are_told_apart(tmp_path):
     ):
         with pytest.raises(ValueError, match=words):
             read(path)
+    write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
+    with pytest.raises(ValueError, match=r"result of a sweep; draw it with: dmoc plot"):
+        dmoc.load(tmp_path / "sweep.nc")
