@@ -13,22 +13,26 @@ from dmoc import stability_command, study_command, sweep_command
 from dmoc.cli_parts import (
     BAD_INPUT,
     INTERRUPTED,
+    SAVED,
     SOLVED,
     File,
     Hold,
     Json,
     Name,
     Order,
+    Quiet,
     Settings,
     Source,
     Steps,
+    Version,
     attached,
     best_start,
+    draw_solution,
     ends_at_once,
     fail,
     problem_of,
     show_answer,
-    warn,
+    switch,
     writable,
 )
 
@@ -40,8 +44,13 @@ USAGE_ERROR: Any = typer.BadParameter.__base__
 app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
-    epilog="Exit codes: 0 solved and every check holds, 2 bad input, 3 not solved, 4 a check failed.",
+    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed, 130 interrupted.",
 )
+
+
+@app.callback()
+def options(version: Version = False) -> None:
+    """What goes before a verb."""
 
 
 @app.command("list", epilog="Example: dmoc list")
@@ -85,14 +94,17 @@ def solve(
     plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
     guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
     starts: Annotated[
-        int, typer.Option(min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined.")
+        int,
+        typer.Option(
+            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
+        ),
     ] = 1,
     as_json: Json = False,
     compiled: Annotated[
         bool,
-        typer.Option("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
+        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Solve a problem, check the answer, show both."""
     import dmoc
@@ -129,7 +141,7 @@ def effects(
     hold: Hold = False,
     settings: Settings = None,
     others: Annotated[
-        bool, typer.Option("--all", help="Also effects of the library that are not in the scene.")
+        bool, switch("--all", help="Also effects of the library that are not in the scene.")
     ] = False,
 ) -> None:
     """Solve a problem and show what each effect does to the path and what it costs."""
@@ -186,7 +198,7 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
 def plot(
-    file: File,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
     problem: Source = None,
 ) -> None:
@@ -200,22 +212,8 @@ def plot(
 
         save_sweep(sweep_data.read(file), target)
     else:
-        _draw_solution(file, target, problem)
+        draw_solution(file, target, problem)
     report.console().print(f"wrote {target}")
-
-
-def _draw_solution(file: Path, target: Path, problem: str | None) -> None:
-    import dmoc
-    from dmoc.plot import save_figure
-
-    try:
-        solution = attached(file, problem)
-    except ValueError as error:
-        solution = dmoc.load(file)
-        if problem is not None:
-            raise
-        warn(f"zones and limits are left out: {error}")
-    save_figure(solution, target)
 
 
 @app.command("export", epilog="Example: dmoc export free_flyer planner --steps 40 --hold")
@@ -226,7 +224,7 @@ def take_away(
     steps: Steps = None,
     hold: Hold = False,
     settings: Settings = None,
-    no_c: Annotated[bool, typer.Option("--no-c", help="Leave out the C code.")] = False,
+    no_c: Annotated[bool, switch("--no-c", help="Leave out the C code.")] = False,
 ) -> None:
     """Write integrator, residual and solver of a problem as CasADi files and C code.
 
@@ -278,7 +276,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     try:
         code = app(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
-        fail(f"error: {error.format_message()} (dmoc --help)", BAD_INPUT)
+        verb = f"{error.ctx.info_name} " if error.ctx and error.ctx.parent else ""
+        fail(f"error: {error.format_message()} (dmoc {verb}--help)", BAD_INPUT)
     except (ValueError, OSError) as error:
         fail(f"error: {error}{users_line(error)}", BAD_INPUT)
     except Exception as error:

@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from dmoc.solution import Solution
     from dmoc.verification import Report
 
+# A switch takes no value, so the help shows none beside it.
+switch = partial(typer.Option, metavar="")
+
 SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 
 
@@ -28,13 +32,22 @@ def names_like(begun: str) -> list[str]:
     return [name for name, _ in catalogue() if name.startswith(begun)]
 
 
+def say_version(wanted: bool) -> None:
+    if wanted:
+        from dmoc import __version__
+
+        print(f"dmoc {__version__}")
+        raise typer.Exit
+
+
 Name = Annotated[
     str,
     typer.Argument(
         metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
     ),
 ]
-File = Annotated[Path, typer.Argument(metavar="FILE", help="A solution saved with `dmoc solve --out`.")]
+SAVED = "A solution saved with `dmoc solve --out`"
+File = Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}.")]
 Source = Annotated[
     str | None,
     typer.Option("--problem", metavar="PROBLEM", help="The problem, if not the one named in the file."),
@@ -47,8 +60,10 @@ Order = Annotated[int | None, typer.Option(help="2 (the default), 4, 6 or 8.")]
 Steps = Annotated[
     int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
 ]
-Hold = Annotated[bool, typer.Option("--hold", help="Forces constant over each step.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
+Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
+Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]
 
 
 def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
@@ -96,6 +111,21 @@ def attached(path: Path, source: str | None) -> Solution:
     return attached
 
 
+def draw_solution(file: Path, target: Path, problem: str | None) -> None:
+    """Draw a saved solution; without its problem, what the file itself has."""
+    import dmoc
+    from dmoc.plot import save_figure
+
+    try:
+        solution = attached(file, problem)
+    except ValueError as error:
+        solution = dmoc.load(file)
+        if problem is not None:
+            raise
+        warn(f"zones and limits are left out: {error}")
+    save_figure(solution, target)
+
+
 def show_answer(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
     """Print the answer and exit with the code that says what it is worth."""
     from dmoc import report
@@ -121,8 +151,11 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def writable(path: Path | None, drawn: bool = False) -> None:
-    """ValueError unless a file can be written there: said before the work, not after it."""
+def writable(path: Path | None, drawn: bool = False, table: bool = False) -> None:
+    """ValueError unless a file can be written there: said before the work, not after it.
+
+    A result takes the place of another one, never that of a problem file or a thesis.
+    """
     if path is None:
         return
     from dmoc.files import path_of
@@ -138,6 +171,17 @@ def writable(path: Path | None, drawn: bool = False) -> None:
 
         if path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+    elif table:
+        if path.suffix.lower() != ".csv":
+            raise ValueError(f"cannot write a table into {path}: the file must end in .csv")
+    elif path.exists() and path.stat().st_size:
+        from dmoc.results import HDF5_SIGNATURE
+
+        with path.open("rb") as stream:
+            if stream.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
+                raise ValueError(
+                    f"cannot write {path}: it is no result that may be replaced; give another name"
+                )
 
 
 @contextmanager

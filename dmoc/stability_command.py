@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dmoc.cli_parts import Json, ends_at_once, writable
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
@@ -21,14 +23,13 @@ def stability(
     eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
     steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
     plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Measure numerical stability: drift over many revolutions, rounding, the longest stable steps.
 
     Coasts Kepler orbits by the schemes of order 2 to 8, by RK4 and by DOP853.
     """
     from dmoc import report
-    from dmoc.cli_parts import ends_at_once, writable
     from dmoc.long_run import drift, kepler, per_revolution
     from dmoc.marching import growth, round_off
 

@@ -9,13 +9,13 @@ from typing import Annotated
 
 import typer
 
+from dmoc.cli_parts import Json, Name, Settings, ends_at_once, switch, writable
+
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
 
 def study(
-    problem: Annotated[
-        str, typer.Argument(metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.")
-    ],
+    problem: Name,
     orders: Annotated[str, typer.Option(metavar="N,N,...", help="Of 2, 4, 6, 8.")] = "2,4,6,8",
     steps: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of steps; if not given, some for each order.")
@@ -24,37 +24,34 @@ def study(
         Path | None,
         typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
     ] = None,
-    cold: Annotated[bool, typer.Option("--cold", help="Also without coarse meshes on the way.")] = False,
+    cold: Annotated[bool, switch("--cold", help="Also without coarse meshes on the way.")] = False,
     compiled: Annotated[
-        bool, typer.Option("--compiled", help="Also with functions as machine code, once they are compiled.")
+        bool, switch("--compiled", help="Also with functions as machine code, once they are compiled.")
     ] = False,
     repeats: Annotated[
-        int, typer.Option(min=1, max=1000, help="How often each solve is timed; the median counts.")
+        int,
+        typer.Option(metavar="N", min=1, max=1000, help="How often each solve is timed; the median counts."),
     ] = 3,
     reference: Annotated[
         float | None, typer.Option(help="The true objective; order 8 on a fine mesh if not given.")
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
-    ] = None,
+    settings: Settings = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time here (png, pdf or svg).")] = None,
     csv: Annotated[Path | None, typer.Option(help="Write a line a solve here.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Measure what accuracy costs in time, for every order on several meshes and for other methods.
 
     Medians of several runs; whatever else the computer does makes them longer.
     """
     from dmoc import report, report_study
-    from dmoc.cli_parts import ends_at_once, writable
     from dmoc.formulation import load_methods
     from dmoc.library import load_problem, parse_settings
     from dmoc.plot_study import save_study
     from dmoc.study import work_precision
 
     writable(plot, drawn=True)
-    writable(csv)
+    writable(csv, table=True)
     chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
     live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():

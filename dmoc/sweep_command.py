@@ -12,7 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dmoc.cli_parts import CHECK_FAILED, INTERRUPTED, NOT_SOLVED, SOLVED, Hold, Name, Order, Settings, Steps
+from dmoc.cli_parts import (
+    CHECK_FAILED,
+    INTERRUPTED,
+    NOT_SOLVED,
+    SOLVED,
+    Hold,
+    Name,
+    Order,
+    Quiet,
+    Settings,
+    Steps,
+    switch,
+    writable,
+)
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
@@ -42,7 +55,7 @@ def sweep(
     settings: Settings = None,
     follow: Annotated[
         bool,
-        typer.Option("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
+        switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
     workers: Annotated[
         int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")
@@ -50,19 +63,21 @@ def sweep(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
     ] = None,
-    restart: Annotated[bool, typer.Option("--restart", help="Begin anew instead of going on.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the last line only.")] = False,
+    restart: Annotated[bool, switch("--restart", help="Begin anew instead of going on.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Solve a problem over a grid or a sample of its parameters.
 
-    Runs on all cores. A sweep that was interrupted goes on where it was when the same command is
-    given again. Draw the result with: dmoc plot FILE
+    Runs on all cores. A sweep that was interrupted goes on when the same command is given again.
+
+    Draw the result with: dmoc plot FILE
     """
     from dmoc import sweeping
     from dmoc.library import parse_settings
     from dmoc.sweep_journal import journal_of
     from dmoc.sweep_plan import parse_vary
 
+    writable(out)
     begun = time.perf_counter()
     with _live(not quiet) as (progress, tries):
         try:
@@ -114,7 +129,9 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
     failed = (
         "." if solved == success.size else f"; {success.size - solved} not solved, see the variable status."
     )
-    checks = "" if not broken else f" Checks fail at {broken} of them, see failed_check."
+    failed_checks = Counter(name for name in result(data, "failed_check").values[success].tolist() if name)
+    named = ", ".join(f"{name} at {count}" for name, count in failed_checks.most_common())
+    checks = "" if not broken else f" Checks fail at {broken} of them ({named}), see failed_check."
     console.print(Text(words + failed + checks, "yellow" if solved < success.size or broken else "green"))
     return NOT_SOLVED if solved < success.size else CHECK_FAILED if broken else SOLVED
 

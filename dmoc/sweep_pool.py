@@ -115,6 +115,7 @@ class SchedulerPool:
     def __init__(self, address: str):
         try:
             from distributed import Client
+            from distributed.comm.addressing import parse_address, parse_host_port
             from distributed.scheduler import KilledWorker
         except ImportError:
             raise ValueError("--scheduler needs dask.distributed: pip install 'dmoc[sweep]'") from None
@@ -124,6 +125,8 @@ class SchedulerPool:
         self._loudness = self._log.level
         self._log.setLevel(logging.CRITICAL)
         try:
+            # a client that was never begun takes 20 s to end, and says so with a traceback
+            parse_host_port(parse_address(address)[1])
             self.client = Client(address, timeout=PATIENCE_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ValueError(f"no scheduler answers at {address} ({error})") from None

@@ -9,6 +9,7 @@ import textwrap
 
 import pytest
 
+import dmoc
 from dmoc.cli import main
 from dmoc.library import load_problem
 
@@ -392,6 +393,24 @@ def test_help_and_list_do_not_load_the_libraries(arguments):
 def test_every_verb_has_an_example(run, verb):
     code, out, _ = run(verb, "--help")
     assert code == 0 and f"Example: dmoc {verb}" in out
+
+
+def test_switches_take_no_value_and_errors_point_to_the_verb(run):
+    _, out, _ = run("solve", "--help")
+    assert re.search(r"--steps +<int>", out) and re.search(r"--hold +Forces", out)
+    assert run("solve", "free_flyer", "--oder", 4)[2].endswith("(dmoc solve --help)\n")
+    assert run("--oder")[2].endswith("(dmoc --help)\n")
+    assert run("--version") == (0, f"dmoc {dmoc.__version__}\n", "")
+
+
+def test_a_result_never_takes_the_place_of_anything_else(run, folder):
+    write(folder, "push")
+    file = folder / "problems" / "push.py"
+    before = file.read_text()
+    code, _, err = run("solve", "push", "--out", file)
+    assert (code, err.count("\n")) == (2, 1) and "no result" in err and file.read_text() == before
+    for _ in range(2):
+        assert run("solve", "push", "--steps", 10, "--out", "push.nc")[0] in (0, 4)
 
 
 def test_without_arguments_it_helps(run):

@@ -120,7 +120,7 @@ MAY_IMPORT = {
     "plot_front": "plot_style sweep_data sweep_plan",
     "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli_parts": "__init__ files library plot report report_tables solution starts verification",
+    "cli_parts": "__init__ files library plot report report_tables results solution starts verification",
     "stability_command": "cli_parts long_run marching plot_stability plot_study report",
     "study_command": "cli_parts formulation library plot_study report report_study study",
     "sweep_command": "cli_parts library report sweeping sweep_data sweep_journal sweep_loop sweep_plan",

@@ -78,8 +78,9 @@ def test_bad_input_is_one_line_and_exit_2(push, here, capfd):
         ["--vary", "mass"],
         ["--vary", "mass=1,2", "--vary", "mass=3"],
         ["--vary", "weight=1:2:3"],
+        ["--vary", "mass=1,2", "--out", str(push)],
     ):
-        assert run("sweep", push, *arguments, "--out", "out.nc") == 2
+        assert run("sweep", push, "--out", "out.nc", *arguments) == 2
         out, err = capfd.readouterr()
         assert out == "" and err.startswith("error: ") and err.count("\n") == 1
     # the problem itself refuses every point
@@ -303,9 +304,10 @@ def test_a_worker_of_a_scheduler_that_dies_loses_its_point_alone(push, cluster):
 def test_a_scheduler_that_is_not_there_is_one_line(push, monkeypatch, capfd):
     pytest.importorskip("distributed")
     monkeypatch.setattr("dmoc.sweep_pool.PATIENCE_S", 0.5)
-    assert run("sweep", push, "--vary", "mass=1,2", "--out", "out.nc", "--scheduler", "tcp://127.0.0.1:9") == 2
-    err = capfd.readouterr().err
-    assert err.startswith("error: no scheduler answers at tcp://127.0.0.1:9") and err.count("\n") == 1
+    for address in ("tcp://127.0.0.1:9", "nonsense"):
+        assert run("sweep", push, "--vary", "mass=1,2", "--out", "out.nc", "--scheduler", address) == 2
+        err = capfd.readouterr().err
+        assert err.startswith(f"error: no scheduler answers at {address}") and err.count("\n") == 1
 
 
 @pytest.mark.slow
