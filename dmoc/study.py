@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.checks import number
 from dmoc.climb import Climb
 from dmoc.formulation import Formulation as Formulation
 from dmoc.formulation import Method, Run, counted, solve_other
@@ -148,7 +149,7 @@ def work_precision(
         for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
         for count in counts
     ]
-    value, doubt = best_known(problem) if reference is None else (float(reference), 1e-16)
+    value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
     rounds = [[_told(progress, labels, run) for labels, run in runs] for _ in range(repeats)]
     scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     return [

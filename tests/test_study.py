@@ -221,6 +221,8 @@ def test_study_prints_one_json_object(capfd):
         (("--against", "nowhere.py"), "no file nowhere.py"),
         (("--plot", "study.txt"), "must end in"),
         (("--csv", "nowhere/study.csv"), "no folder"),
+        (("--csv", "rendezvous.py"), "must end in .csv"),
+        (("--reference", "nan"), "reference must be a finite number"),
     ],
 )
 def test_bad_options_are_one_line(capfd, options, words):
