@@ -82,12 +82,9 @@ def residual_jacobian(scene: Scene) -> Exported:
     path = path_symbols(scene)
     rows = ca.vec(residual_of(scene, path))
     outputs = {f"by_{name}": ca.jacobian(rows, ca.vec(symbol)) for name, symbol in path.items()}
-    terms = {
-        f"by_{name}": Term(
-            f"N/({TERMS[name].unit})", f"derivative of the residual by {name}, both stacked column after column"
-        )
-        for name in path
-    }
+    words = "derivative of the residual by {}, both stacked column after column"
+    units = {name: "N/({})" if "/" in TERMS[name].unit else "N/{}" for name in path}
+    terms = {f"by_{name}": Term(units[name].format(TERMS[name].unit), words.format(name)) for name in path}
     return Exported(named("residual_jacobian", path, outputs), "sparse derivatives of the residual", terms)
 
 

@@ -189,7 +189,7 @@ def _solver_terms(planner: Planner) -> dict[str, Term]:
         "objective": Term(unit, "the objective, in its own sign"),
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
         "violation": Term("-", "largest violation of a row or bound, relative to its scale"),
-        "duration": Term("s", "duration found"),
+        "duration": Term("s", "duration of the transfer"),
     }
     for name in planner.multipliers:
         words = (
