@@ -136,9 +136,7 @@ def checks(report: Report) -> RenderableType:
         else:
             verdict = Text("holds", "green") if check.ok else Text("FAILS", "bold red")
         value, limit = ("-" if number is None else f"{number:.4g}" for number in (check.value, check.limit))
-        # a note of several lines is worth its room only where something is wrong
-        note = Text(check.note, no_wrap=check.ok, overflow="ellipsis" if check.ok else "fold")
-        table.add_row(check.name, value, limit, check.unit, verdict, note)
+        table.add_row(check.name, value, limit, check.unit, verdict, check.note)
     return table
 
 

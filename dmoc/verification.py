@@ -136,7 +136,7 @@ def _rollout(case: Case) -> Check:
     turned = ROUNDING * case.acceleration * case.path.duration
     floor = case.rounding / case.extent + (case.rounding / case.shortest + turned) / case.speed
     limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
-    note = f"{miss:.2g} m and {slip:.2g} m/s off; the path amplifies errors {growth:.2g} times"
+    note = f"{miss:.2g} m, {slip:.2g} m/s; path amplifies errors {growth:.2g} times"
     return _check("rollout", np.max([miss / case.extent, slip / case.speed]), limit, "of the path", note)
 
 
@@ -226,8 +226,8 @@ def _optimality(case: Case) -> Check:
     """First-order conditions: for least effort lambda = -m F, but for what limits of the force add to it."""
     left = stationarity(case)
     note = (
-        f"controls to {left.force:.1e}, costates to {left.path:.1e}, idle limits to {left.limits:.1e}, "
-        f"objective as stated to {left.objective:.1e}"
+        f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "
+        f"objective {left.objective:.0e}"
     )
     return _check("optimality", left.largest, OPTIMALITY, "-", note)
 
