@@ -106,7 +106,9 @@ def sweep(
         raise ValueError("a sample has no order in which to follow a branch; leave out follow, or use a grid")
     wrong = isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= MOST_WORKERS
     if workers is not None and wrong:
-        raise ValueError(f"workers must be a whole number, 1 to {MOST_WORKERS}; got {workers!r}")
+        raise ValueError(
+            f"workers must be a whole number of at most {MOST_WORKERS} and at least 1; got {workers!r}"
+        )
     numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold}
     facts = _facts(file, plan, fixed, numerics | {"follow": follow})
     if plan.sampled:
