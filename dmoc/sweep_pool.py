@@ -118,7 +118,7 @@ class SchedulerPool:
             from distributed.comm.addressing import parse_address, parse_host_port
             from distributed.scheduler import KilledWorker
         except ImportError:
-            raise ValueError("--scheduler needs dask.distributed: pip install 'dmoc[sweep]'") from None
+            raise ValueError("--scheduler needs dask.distributed: pip install distributed") from None
         self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
         # what it logs, with tracebacks, is raised here in one line
         self._log = logging.getLogger("distributed.client")

@@ -53,6 +53,31 @@ def test_nothing_in_the_readme_is_left_out():
     assert sum(len(parts(text)) for text in SECTIONS.values()) == blocks + len(commands) > 10
 
 
+# commands within a line of text, and why some of them are not run
+INLINE = re.findall(r"`\./scripts/run (dmoc [^`]+|python scripts/[^`]+)`", TEXT)
+ELSEWHERE = {
+    "python scripts/references.py --readme": "tests/test_problems.py holds every row",
+    "python scripts/gallery.py": "it writes the pictures; tests/test_problems.py solves every problem",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", [line for line in dict.fromkeys(INLINE) if line not in ELSEWHERE])
+def test_commands_within_the_text_work_too(line, tmp_path):
+    words = [str(ROOT / word) if word.startswith("scripts/") else word for word in shlex.split(line)[1:]]
+    before = [sys.executable, "-m", "dmoc.cli"] if line.startswith("dmoc") else [sys.executable]
+    ended = subprocess.run([*before, *words], capture_output=True, text=True, cwd=tmp_path, timeout=300)
+    assert ended.returncode == 0, ended.stderr
+    assert all((tmp_path / name).stat().st_size > 1000 for name in re.findall(r"--plot (\S+)", line))
+
+
+def test_what_a_limit_too_small_ends_with():
+    command, shown = re.findall(r"`dmoc (solve [^`]+)` ends with\n\n {4}([^\n]+)", TEXT)[0]
+    command = [sys.executable, "-m", "dmoc.cli", *shlex.split(command)]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 3 and " ".join(ended.stdout.split()).endswith(shown)
+
+
 def test_every_file_the_readme_names_is_there():
     named = re.findall(r"\]\((?!https?:)([^)#]+)\)", TEXT)
     named += re.findall(r"\b((?:scripts|dmoc|tests|problems)/[\w/]+\.\w+)", TEXT)
