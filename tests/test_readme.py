@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import dmoc
 from dmoc.library import catalogue
 
 ROOT = Path(__file__).parents[1]
@@ -69,6 +70,24 @@ def test_commands_within_the_text_work_too(line, tmp_path):
     ended = subprocess.run([*before, *words], capture_output=True, text=True, cwd=tmp_path, timeout=300)
     assert ended.returncode == 0, ended.stderr
     assert all((tmp_path / name).stat().st_size > 1000 for name in re.findall(r"--plot (\S+)", line))
+
+
+def test_the_readme_names_everything_a_problem_is_made_of():
+    kinds = (
+        dmoc.Boundary,
+        dmoc.Effect,
+        dmoc.Actuator,
+        dmoc.Objective,
+        dmoc.Constraint,
+        dmoc.Atmosphere,
+        dmoc.Shadow,
+    )
+    public = {name: getattr(dmoc, name) for name in dmoc.__all__}
+    parts = {name for name, part in public.items() if isinstance(part, type) and issubclass(part, kinds)}
+    bases = {kind.__name__ for kind in kinds} | {"Conservative", "Force", "WeightedSum"}
+    table = TEXT[TEXT.index("| what | names |") :].partition("\n\n")[0]
+    named = set(re.findall(r"`(\w+)", table))
+    assert parts - bases <= named <= set(public)
 
 
 def test_what_a_limit_too_small_ends_with():
