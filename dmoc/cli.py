@@ -13,6 +13,7 @@ from dmoc import stability_command, study_command, sweep_command
 from dmoc.cli_parts import (
     BAD_INPUT,
     INTERRUPTED,
+    NOT_SOLVED,
     SAVED,
     SOLVED,
     File,
@@ -193,7 +194,7 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, problem)
         verdict = verify(solution)
-    show_answer(solution, verdict, as_json)
+    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -93,18 +93,16 @@ def attached(path: Path, source: str | None) -> Solution:
     The name in a file is only ever looked up in the problem folders: a file must not choose what is run.
     """
     import dmoc
-    from dmoc.library import load_problem
+    from dmoc.library import has_problem, load_problem
 
     solution = dmoc.load(path)
     known = solution.provenance
-    if source is None and not known.problem_name.isidentifier():
-        raise ValueError(f"{path} names no problem file ({known.problem_name!r}); give it with --problem PATH")
-    try:
-        file = load_problem(source or known.problem_name)
-    except ValueError as error:
+    if source is None and not (known.problem_name.isidentifier() and has_problem(known.problem_name)):
         raise ValueError(
-            error if source else f"{error}; {path} was made from it: give it with --problem PATH"
-        ) from None
+            f"{path} was made from {known.problem_name!r}, of which there is no problem file; "
+            "give it with --problem PATH"
+        )
+    file = load_problem(source or known.problem_name)
     attached = solution.attach(file.make(**known.parameters))
     if known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
@@ -126,7 +124,14 @@ def draw_solution(file: Path, target: Path, problem: str | None) -> None:
     save_figure(solution, target)
 
 
-def show_answer(solution: Solution, verdict: Report | None, as_json: bool, quiet=False, written=()) -> None:
+def show_answer(
+    solution: Solution,
+    verdict: Report | None,
+    as_json: bool,
+    quiet: bool = False,
+    written: Sequence[Path] = (),
+    stopped: int = INTERRUPTED,
+) -> None:
     """Print the answer and exit with the code that says what it is worth."""
     from dmoc import report
 
@@ -138,7 +143,7 @@ def show_answer(solution: Solution, verdict: Report | None, as_json: bool, quiet
     else:
         console.print(report.failure(solution, quiet, written))
     if not solution.success:
-        raise typer.Exit(INTERRUPTED if solution.status == "stopped" else NOT_SOLVED)
+        raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
     raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
 
 

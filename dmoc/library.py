@@ -103,6 +103,11 @@ def catalogue() -> list[tuple[str, str]]:
     return sorted(found.items())
 
 
+def has_problem(name: str) -> bool:
+    """Whether one of the problem folders has a file of this name."""
+    return any(path.stem == name for path in _files())
+
+
 def find(name: str) -> Path:
     """The problem file for a name or a path.
 

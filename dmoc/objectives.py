@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -72,6 +73,11 @@ class Objective(ABC):
     def unit_with(self, actuator: Actuator) -> str:
         """The unit of the objective with this actuator."""
         return self.unit
+
+    @property
+    def label(self) -> str:
+        """What it is, such as `final mass`."""
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
 
     def words(self) -> str:
         """One line for a person."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -202,8 +201,7 @@ def _headline(solution: Solution) -> str:
 
 def _wanted(objective: Objective) -> str:
     """Such as `least effort` or `greatest final mass`."""
-    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(objective).__name__).lower()
-    return f"{'least' if objective.sense > 0 else 'greatest'} {name}"
+    return f"{'least' if objective.sense > 0 else 'greatest'} {objective.label}"
 
 
 def _footnote(solution: Solution, report: Report | None) -> tuple[str, bool]:

@@ -192,11 +192,11 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
 def figures(solution: Solution) -> str:
     """Such as `effort 0.075 N^2 s, duration 26 s`."""
     problem = solution.require_problem()
-    name, unit = type(problem.objective).__name__.lower(), solution.provenance.objective_unit
+    name, unit = problem.objective.label, solution.provenance.objective_unit
     parts = [f"{name} {solution.objective:.8g} {unit}".rstrip()]
     if name != "time":
         parts.append(f"duration {solution.duration:.8g} s")
-    if solution.final_mass != problem.mass:
+    if name != "final mass" and solution.final_mass != problem.mass:
         parts.append(f"final mass {solution.final_mass:.8g} kg")
     return ", ".join(parts)
 

@@ -149,7 +149,7 @@ def _record(solution: Solution, warm: bool) -> dict[str, Any]:
     return record | {
         "success": True,
         "objective": solution.objective,
-        "objective_name": type(problem.objective).__name__.lower(),
+        "objective_name": problem.objective.label,
         "objective_unit": solution.provenance.objective_unit,
         "objective_sense": problem.objective.sense,
         "duration": solution.duration,

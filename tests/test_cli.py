@@ -307,7 +307,7 @@ def test_a_file_never_chooses_what_is_run(run, folder):
     (folder / "evil.py").write_text("open('ran', 'w').close()\n")
     for name in ("evil.py", "../evil", "./evil.py", str(folder / "evil.py")):
         load("push.nc").save("evil.nc", problem_name=name)
-        assert refused(run("check", "evil.nc"), "names no problem file", "--problem")
+        assert refused(run("check", "evil.nc"), "no problem file", "--problem")
     assert not (folder / "ran").exists()
 
 
@@ -429,3 +429,18 @@ def test_a_shell_completes_the_names_of_problems(tmp_path):
         env=dict(os.environ) | asked,
     )
     assert ended.stdout.split() == ["free_flyer"], ended.stderr
+
+
+def test_what_was_stopped_is_not_solved_when_it_is_checked_later(run, tmp_path):
+    file = load_problem("orbit_raise")
+    stopped = dmoc.solve(file.make(), progress=lambda *told: True)
+    assert stopped.status == "stopped"
+    stopped.save(tmp_path / "half.nc", source_hash=file.source_hash)
+    code, out, err = run("check", tmp_path / "half.nc")
+    assert (code, err) == (3, "") and "Not solved: stopped" in out
+
+
+def test_an_answer_names_its_objective_in_words_and_once(run):
+    code, out, _ = run("solve", "dionysus", "--quiet")
+    assert code == 0 and re.match(r"Solved, a local optimum: final mass \S+ kg, duration", out)
+    assert out.count("final mass") == 1
