@@ -28,6 +28,7 @@ SECTIONS = {text.splitlines()[0]: text for text in re.split(r"^## ", TEXT, flags
 @pytest.mark.parametrize("section", SECTIONS)
 def test_what_the_readme_shows_works(section, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
     names = {"__name__": "readme"}
     for part in parts(SECTIONS[section]):
         if part["command"]:
