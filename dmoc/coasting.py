@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from dmoc.effects.frames import RotatingFrame
 from dmoc.effects.gravity import PointGravity
 from dmoc.mechanics import Dynamics
 from dmoc.problem import TransferProblem
-from dmoc.spiral import Spiral, Winding
+from dmoc.spiral import MOST_BENT, Spiral, Winding
 
 # How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
 PASSES = 3
@@ -37,6 +38,17 @@ def lone_attractor(problem: TransferProblem) -> PointGravity | None:
 
 def center_of(attractor: PointGravity, dimension: int) -> np.ndarray:
     return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
+
+
+def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
+    """Rate of a circular orbit around all attractors, sqrt(sum mu / r^3) [1/s]; 0 without any."""
+    squares = np.zeros(len(position))
+    for attractor in attractors_of(problem):
+        distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
+        # a node in the attractor itself asks for no steps: it is refused by name
+        outside = distance > 1e-6 * distance.max()
+        squares[outside] += attractor.mu / distance[outside] ** 3
+    return np.sqrt(squares)
 
 
 def coast(problem: TransferProblem, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
@@ -110,25 +122,32 @@ def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Sp
     return spiral if gap < 0.05 * _distance(place, spiral.center[: problem.dimension]) else None
 
 
-def winding_path(
-    problem: TransferProblem, duration: float, states: Any, fractions: np.ndarray, more: int = 0
-) -> np.ndarray | None:
-    """Positions of many revolutions between two states around a lone attractor, or of so many more.
+def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:
+    """Paths of an orbit that changes evenly between two states around a lone attractor, and their revolutions.
 
-    None where there is no such path: an end is open, the orbits are too different or the revolutions few.
+    The one whose number of revolutions fits the duration best, and where none fits well one more and
+    one less; or that of so many `more`. None where an end is open or the orbits are too different. A
+    path is a function of the fractions of the duration.
     """
     attractor = lone_attractor(problem)
     if attractor is None or not (problem.start.anchored and problem.goal.anchored):
-        return None
+        return []
     start, goal = _from_center(problem, attractor, states)
     spins = np.cross(*start), np.cross(*goal)
     if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
-        return None
-    winding = Winding(attractor.mu, duration, start, goal, more)
-    if winding.eccentricity > MOST_ECCENTRIC or winding.turns - more < MANY_TURNS:
-        return None
-    n = problem.dimension
-    return winding.positions(fractions)[:, :n] + center_of(attractor, n)
+        return []
+    center = center_of(attractor, problem.dimension)
+
+    def positions(winding: Winding, fractions: np.ndarray) -> np.ndarray:
+        return winding.positions(fractions)[:, : problem.dimension] + center
+
+    windings = [Winding(attractor.mu, duration, start, goal, more or 0)]
+    if windings[0].eccentricity > MOST_ECCENTRIC or not windings[0].lasts:
+        return []
+    if more is None and abs(windings[0].bend) > MOST_BENT:
+        others = (Winding(attractor.mu, duration, start, goal, step) for step in (-1, 1))
+        windings += [other for other in others if other.turns != windings[0].turns and other.lasts]
+    return [(partial(positions, winding), winding.turns) for winding in windings]
 
 
 def _from_center(problem: TransferProblem, attractor: PointGravity, states: Any) -> list[tuple]:

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dmoc.checks import short
-from dmoc.coasting import (
-    attractors_of,
-    center_of,
-    coast,
-    end_estimates,
-    lone_attractor,
-    spiral_between,
-    winding_path,
-)
+from dmoc.coasting import attractors_of, end_estimates, lone_attractor, orbital_rates, spiral_between
 from dmoc.constraints import KeepOut
+from dmoc.default_path import path_around, shortest_flyable
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes, uniform_mesh
@@ -28,8 +22,6 @@ from dmoc.simulation import legendre_momenta
 CENTRAL, PUSH = 0.05, 0.3
 # Steps follow the motion where its rate around attractors varies more than this along the guess.
 UNEVEN, SAMPLES = 5.0, 1000
-# No coast is followed at more places than this.
-MOST_SAMPLES = 100_000
 
 
 def starting_guess(
@@ -71,17 +63,6 @@ def starting_guess(
     mass = np.full(len(fractions), problem.mass)
     guess = Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
-
-
-def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
-    """Rate of a circular orbit around all attractors, sqrt(sum mu / r^3) [1/s]; 0 without any."""
-    squares = np.zeros(len(position))
-    for attractor in attractors_of(problem):
-        distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
-        # a node in the attractor itself asks for no steps: it is refused by name
-        outside = distance > 1e-6 * distance.max()
-        squares[outside] += attractor.mu / distance[outside] ** 3
-    return np.sqrt(squares)
 
 
 def angle_around(problem: TransferProblem, guess: Guess) -> float:
@@ -132,7 +113,8 @@ def guess_duration(problem: TransferProblem) -> float:
     """The duration, or a likely one within its bounds [s].
 
     With a force limit: from rest to rest over the distance and the change of velocity at full
-    force, and a fifth more; where the angle on an orbit is open, over the distance from the attractor
+    force, and a fifth more; between two places near an attractor as long as the default path needs;
+    where the angle on an orbit is open, over the distance from the attractor
     or the change of the orbit, whatever is longer. Otherwise the geometric mean of the bounds.
     """
     shortest, longest = problem.duration_bounds
@@ -144,6 +126,8 @@ def guess_duration(problem: TransferProblem) -> float:
         return middle
     q0, v0, q1, v1 = _end_states(problem, middle)
     acceleration = limit / problem.mass
+    if lone_attractor(problem) is not None and problem.start.anchored and problem.goal.anchored:
+        return shortest_flyable(problem, partial(_ends_in_pairs, problem), acceleration)
     spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
     if spiral is not None:
         needed = max(2 * np.sqrt(spiral.climb / acceleration), spiral.velocity_change / acceleration)
@@ -183,90 +167,18 @@ def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, 
     return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
 
 
-def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
-    """Positions, the velocities of both ends, and whether they are those of a spiral."""
+def _ends_in_pairs(problem: TransferProblem, duration: float) -> tuple:
     q0, v0, q1, v1 = _end_states(problem, duration)
-    attractors, straight = attractors_of(problem), q0 + fractions[:, None] * (q1 - q0)
-    if not attractors:
-        return straight, (v0, v1), False
-    spiral = spiral_between(problem, duration, ((q0, v0), (q1, v1)))
-    if spiral is not None:
-        path = spiral.states(fractions)[0] + spiral.center
-        return path[:, : problem.dimension], (v0, v1), True
-    winding = winding_path(problem, duration, ((q0, v0), (q1, v1)), fractions)
-    if winding is not None:
-        return winding, (v0, v1), True
-    turns = duration * orbital_rates(problem, np.stack([q0, q1])).max()
-    sample = np.linspace(0.0, 1.0, int(np.clip(20 * turns, 2000, MOST_SAMPLES)))
-    forward = coast(problem, duration * sample, q0, v0)
-    backward = coast(problem, duration * sample[::-1], q1, v1)
-    if forward is None or backward is None:
-        # a coast that falls into an attractor is no path to start from
-        return _keep_clear(straight, attractors, q0, q1), (v0, v1), False
-    arcs = [forward[:, : problem.dimension], backward[::-1, : problem.dimension]]
-    lone = lone_attractor(problem)
-    if lone is not None:
-        center = center_of(lone, problem.dimension)
-        states = ((q0 - center, v0), (q1 - center, v1))
-        path = center + _blend_around(sample, arcs[0] - center, arcs[1] - center, states)
-    else:
-        blend = _smooth(sample)[:, None]
-        path = (1 - blend) * arcs[0] + blend * arcs[1]
-    path = np.stack([np.interp(fractions, sample, column) for column in path.T], axis=1)
-    return _keep_clear(path, attractors, q0, q1), (v0, v1), False
+    return (q0, v0), (q1, v1)
 
 
-def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
-    """Blend two arcs around an attractor at the origin in radius, angle and height.
-
-    The number of revolutions is the mean of what the two arcs sweep in the whole duration: it comes
-    from the periods of the two ends and the duration, never from positions alone.
-    """
-    frame = _orbit_frame(states)
-    arcs = [np.pad(arc, ((0, 0), (0, 3 - arc.shape[1]))) @ frame for arc in (first, second)]
-    angles = [np.unwrap(np.arctan2(arc[:, 1], arc[:, 0])) for arc in arcs]
-    sweeps = [angle[-1] - angle[0] for angle in angles]
-    gap = angles[1][-1] - angles[0][0] - 0.5 * (sweeps[0] + sweeps[1])
-    angles[1] = angles[1] - 2 * np.pi * np.round(gap / (2 * np.pi))
-    blend = _smooth(sample)
-
-    def mix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return (1 - blend) * a + blend * b
-
-    radius = mix(*(np.hypot(arc[:, 0], arc[:, 1]) for arc in arcs))
-    angle, height = mix(*angles), mix(arcs[0][:, 2], arcs[1][:, 2])
-    path = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1) @ frame.T
-    return path[:, : first.shape[1]]
-
-
-def _orbit_frame(states) -> np.ndarray:
-    """Columns: two axes in the mean orbital plane and its normal."""
-    normal = np.zeros(3)
-    for q, v in states:
-        momentum = np.cross(np.pad(q, (0, 3 - len(q))), np.pad(v, (0, 3 - len(v))))
-        normal += momentum / (np.linalg.norm(momentum) or 1.0)
-    if len(states[0][0]) == 2 or np.linalg.norm(normal) < 1e-6:
-        normal = np.array([0.0, 0.0, 1.0])
-    normal /= np.linalg.norm(normal)
-    first = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[0]) > abs(normal[2]) else [0.0, -1.0, 0.0])
-    if np.linalg.norm(first) < 1e-6:
-        first = np.cross(normal, [1.0, 0.0, 0.0])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first), normal], axis=1)
-
-
-def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
-    """Push nodes out of the neighbourhood of attractors, where no scheme can start."""
-    for attractor in attractors:
-        center = center_of(attractor, len(q0))
-        offset = path - center
-        distance = np.linalg.norm(offset, axis=1, keepdims=True)
-        least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))
-        sideways = np.roll(q1 - q0, 1) if len(q0) > 1 else np.ones(1)
-        offset = np.where(distance > 1e-9 * least, offset, sideways / (np.linalg.norm(sideways) or 1.0))
-        length = np.linalg.norm(offset, axis=1, keepdims=True)
-        path = center + offset * np.maximum(distance, least) / np.where(length > 0, length, 1.0)
-    return path
+def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
+    """Positions, the velocities of both ends, and whether the path is worth its forces."""
+    q0, v0, q1, v1 = _end_states(problem, duration)
+    if not attractors_of(problem):
+        return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
+    path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
+    return path, (v0, v1), worth
 
 
 def _past_centres(problem: TransferProblem, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
@@ -294,7 +206,3 @@ def _past_centres(problem: TransferProblem, path: np.ndarray, fractions: np.ndar
         push = PUSH * zone.radius * near / max(near[node], 1e-3)
         path = path + push[:, None] * aside / np.linalg.norm(aside)
     return path
-
-
-def _smooth(x: np.ndarray) -> np.ndarray:
-    return x * x * (3 - 2 * x)

@@ -56,7 +56,8 @@ def make_solver(
     # rows are momenta: an error of 1e-10 in each is one of 1e-10 N in the force, so finer meshes ask for less,
     # down to the rounding of positions over the shortest step
     floor = 20 * np.finfo(float).eps * nlp.scheme.degree / np.diff(nlp.mesh).min()
-    tolerance = max(min(1e-10, 1e-8 / len(nlp.mesh)), floor)
+    # without limits the last iterations converge quadratically: two more digits are one of them at most
+    tolerance = max(min(1e-10 if nlp.problem.limited else 5e-12, 1e-8 / len(nlp.mesh)), floor)
     settings: dict[str, Any] = {
         "jac_g": parts.jacobian,
         "hess_lag": parts.hessian,

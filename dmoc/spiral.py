@@ -92,8 +92,9 @@ class Spiral:
         return np.linalg.norm(self._elements[0], axis=1)
 
 
-# The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these.
-MOST_BENT = 0.9
+# The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these;
+# beyond, the speed leaves that between the orbits, by no more than a fifth.
+MOST_BENT, MOST_BEYOND = 0.9, 0.2
 SAMPLES_A_TURN, ROUNDS = 100, 5
 
 
@@ -107,7 +108,8 @@ class Winding:
     best thrust swings with the angle L: across as cos L, along and up as 2 cos L and sin L), so the
     optimum is a straight line in polar coordinates, passed evenly. The body moves as fast as on the orbit
     of the moment. The number of revolutions is the one that takes about the duration, or so many `more`;
-    what is left goes into an earlier or later change of the orbit, and if that is not enough into the pace.
+    what is left goes into an earlier or later change of the orbit, and if that is not enough into a higher or
+    lower orbit on the way, by a parabola: the least effort for a phase alone.
     """
 
     mu: float
@@ -135,22 +137,29 @@ class Winding:
         """Whole revolutions beyond the angle between the ends."""
         turns = 10
         for _ in range(ROUNDS):
-            # from a place to itself no revolution is no way at all
             taken = self._time(turns) or self._time(turns + 1)
             turns = max(round((turns + 1) * self.duration / taken) - 1, 0)
         return max(turns + self.more, 0)
 
+    @property
+    def lasts(self) -> bool:
+        """Whether there is a way at all: from a place to itself there is none without a revolution."""
+        return self._time(self.turns) > 0
+
     @cached_property
     def bend(self) -> float:
-        """How much earlier than evenly the orbit changes."""
+        """How much earlier than evenly the orbit changes; beyond 0.9, how far above or below both orbits."""
         from scipy.optimize import brentq
 
         def excess(bend: float) -> float:
             return self._time(self.turns, bend) - self.duration
 
-        if excess(-MOST_BENT) * excess(MOST_BENT) > 0:
-            return min(0.0, -MOST_BENT, MOST_BENT, key=lambda bend: abs(excess(bend)))
-        return float(brentq(excess, -MOST_BENT, MOST_BENT, xtol=1e-6))
+        if abs(excess(0.0)) < 1e-6 * self.duration:
+            return 0.0
+        most = MOST_BENT + MOST_BEYOND
+        if excess(-most) * excess(most) > 0:
+            return min(0.0, -most, most, key=lambda bend: abs(excess(bend)))
+        return float(brentq(excess, -most, most, xtol=1e-6))
 
     def _time(self, turns: int, bend: float = 0.0) -> float:
         return float(self._times(turns, bend)[1][-1])
@@ -168,7 +177,10 @@ class Winding:
         (first, begin), (last, end) = self._ends
         end = begin + (end - begin) % (2 * np.pi) + 2 * np.pi * turns
         time = self._even(at)
-        speed, share = self._line(time + bend * time * (1 - time))
+        bent = float(np.clip(bend, -MOST_BENT, MOST_BENT))
+        speed, share = self._line(time + bent * time * (1 - time))
+        upward = 1 if last[0] >= first[0] else -1
+        speed = speed * (1 - 4 * upward * (bend - bent) * time * (1 - time))
         others = first[1:, None] + share * (last - first)[1:, None]
         return np.concatenate([[speed**-2], others]), begin + at * (end - begin)
 

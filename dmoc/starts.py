@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.climb import COARSEST_NODES, Climb
-from dmoc.coasting import center_of, lone_attractor, winding_path
+from dmoc.coasting import center_of, lone_attractor, windings_between
 from dmoc.constraints import KeepOut
 from dmoc.guess import starting_guess
 from dmoc.mesh import Guess
@@ -88,9 +88,9 @@ def _variants(problem: TransferProblem, base: Guess) -> Iterator[tuple[str, Gues
         center = center_of(lone, problem.dimension)
         ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
         for turns in (1, -1, 2, -2):
-            position = winding_path(problem, base.duration, ends, base.fractions, turns)
-            if position is None:
-                position = center + _turned(base.position - center, turns * base.fractions)
+            windings = windings_between(problem, base.duration, ends, turns)
+            turned = center + _turned(base.position - center, turns * base.fractions)
+            position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
     for i, constraint in enumerate(problem.constraints):
         if isinstance(constraint, KeepOut):

@@ -170,12 +170,12 @@ def test_a_path_survives_the_journal_to_the_last_bit():
 
 
 def test_a_neighbour_saves_iterations_and_finds_the_same_optimum():
-    file = load_problem("orbit_raise")
+    file = load_problem("drone_hop")
     numerics = {"order": 2, "steps": 100, "tol": None, "hold": False}
-    task = Task(str(file.path), file.source_hash, {"duration": 11.5}, numerics)
+    task = Task(str(file.path), file.source_hash, {"mass": 0.95}, numerics)
     cold, _ = solve_point(task)
-    _, path = solve_point(Task(str(file.path), file.source_hash, {"duration": 12.0}, numerics))
-    warm, _ = solve_point(Task(str(file.path), file.source_hash, {"duration": 11.5}, numerics, path))
+    _, path = solve_point(Task(str(file.path), file.source_hash, {"mass": 1.0}, numerics))
+    warm, _ = solve_point(Task(str(file.path), file.source_hash, {"mass": 0.95}, numerics, path))
     assert warm["from_neighbour"] and not cold["from_neighbour"]
     assert warm["objective"] == pytest.approx(cold["objective"], rel=1e-8)
     assert warm["iterations"] <= 0.7 * cold["iterations"]
