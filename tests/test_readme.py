@@ -59,7 +59,7 @@ def test_nothing_in_the_readme_is_left_out():
 INLINE = re.findall(r"`\./scripts/run (dmoc [^`]+|python scripts/[^`]+)`", TEXT)
 ELSEWHERE = {
     "python scripts/references.py --readme": "tests/test_problems.py holds every row",
-    "python scripts/effects_cost.py --readme": "it writes the README; tests/test_instruction_count.py counts",
+    "python scripts/effects_cost.py --readme": "it writes the README; tests/test_influence.py runs the script",
     "python scripts/gallery.py": "it writes the pictures; tests/test_problems.py solves every problem",
 }
 
