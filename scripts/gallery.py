@@ -3,16 +3,18 @@
     ./scripts/run python scripts/gallery.py                   # all of them
     ./scripts/run python scripts/gallery.py goddard           # some; the pictures of the others stay
     ./scripts/run python scripts/gallery.py stability         # the long runs of `dmoc stability`, two minutes
+    ./scripts/run python scripts/gallery.py sweep             # the map of times and angles, one minute
 
 Pictures go to problems/gallery. The exit code is 1 if a problem is not solved or fails a check.
 """
 
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from dmoc import solve, verify
+from dmoc import solve, sweep, verify
 from dmoc.docstrings import first_line
 from dmoc.library import load_problem
 from dmoc.long_run import drift, kepler, per_revolution
@@ -20,12 +22,14 @@ from dmoc.marching import growth, round_off
 from dmoc.plot import save_figure
 from dmoc.plot_stability import stability_figure
 from dmoc.plot_study import save_page
+from dmoc.plot_sweep import figure
 from dmoc.solution import Solution
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"
 DPI = 90  # 1200 pixels wide
-LONG_RUNS = "stability"
+LONG_RUNS, SWEEP = "stability", "sweep"
+VARIED = {"duration": "5:17:25", "angle": "4:14:21"}
 
 
 def row(name: str, words: str, solution: Solution, holds: bool) -> str:
@@ -51,14 +55,24 @@ def draw_long_runs() -> None:
     save_page(stability_figure(runs, round_off(), growth()), GALLERY / f"{LONG_RUNS}.png", DPI)
 
 
+def draw_sweep() -> None:
+    """What the README's sweep of `orbit_raise` over 525 points draws."""
+    with TemporaryDirectory() as work:
+        data = sweep("orbit_raise", VARIED, Path(work) / "map.nc", order=8, steps=25)
+    save_page(figure(data), GALLERY / f"{SWEEP}.png", DPI)
+    reduce_colors(GALLERY / f"{SWEEP}.png")
+
+
 def main(names: list[str]) -> int:
     GALLERY.mkdir(exist_ok=True)
+    if SWEEP in names or not names:
+        draw_sweep()
     if LONG_RUNS in names or not names:
         draw_long_runs()
     print("| problem | what it is | command | objective | s |", "|---|---|---|---|---|", sep="\n")
     worst = 0
     wanted = names or sorted(path.stem for path in PROBLEMS.glob("*.py"))
-    for name in [name for name in wanted if name != LONG_RUNS]:
+    for name in [name for name in wanted if name not in (LONG_RUNS, SWEEP)]:
         file = load_problem(str(PROBLEMS / f"{name}.py"))
         solution = solve(file.make())
         report = verify(solution) if solution.success else None
