@@ -22,7 +22,7 @@ PASSES = 3
 # From so many revolutions on a path between two states winds evenly around the attractor.
 MANY_TURNS = 3
 # Orbits beyond this eccentricity, or this cosine of the angle between their planes, have no even change.
-MOST_ECCENTRIC, OPPOSITE = 0.9, -0.9
+MOST_ECCENTRIC, NEARLY_ROUND, OPPOSITE = 0.9, 0.3, -0.9
 
 
 def attractors_of(problem: TransferProblem) -> list[PointGravity]:
@@ -123,11 +123,13 @@ def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Sp
 
 
 def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:
-    """Paths of an orbit that changes evenly between two states around a lone attractor, and their revolutions.
+    """Paths of an orbit that changes evenly between two states around a lone attractor, each with two facts.
 
-    The one whose number of revolutions fits the duration best, and where none fits well one more and
-    one less; or that of so many `more`. None where an end is open or the orbits are too different. A
-    path is a function of the fractions of the duration.
+    They are its revolutions, and whether it is sure to be near the best: a nearly round orbit that need
+    not go beyond those of the ends for its phase. First the path whose number of revolutions fits the
+    duration best, and where none fits well one with one more and one less; or only that with so many
+    `more`. None where an end is open or the orbits are too different. A path is a function of the
+    fractions of the duration.
     """
     attractor = lone_attractor(problem)
     if attractor is None or not (problem.start.anchored and problem.goal.anchored):
@@ -147,7 +149,9 @@ def windings_between(problem: TransferProblem, duration: float, states: Any, mor
     if more is None and abs(windings[0].bend) > MOST_BENT:
         others = (Winding(attractor.mu, duration, start, goal, step) for step in (-1, 1))
         windings += [other for other in others if other.turns != windings[0].turns and other.lasts]
-    return [(partial(positions, winding), winding.turns) for winding in windings]
+    found = [(partial(positions, winding), winding.turns) for winding in windings]
+    sure = abs(windings[0].bend) <= MOST_BENT and windings[0].eccentricity < NEARLY_ROUND
+    return [(*winding, sure) for winding in found]
 
 
 def _from_center(problem: TransferProblem, attractor: PointGravity, states: Any) -> list[tuple]:

@@ -60,9 +60,9 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     if problem.free_duration and not many:
         # the duration will follow from the phase, not the other way round
         windings = []
-    paths: list[Path] = [winding for winding, _ in windings]
-    turns = max((turns for _, turns in windings), default=0)
-    if not many:
+    paths: list[Path] = [winding for winding, _, _ in windings]
+    turns = max((turns for _, turns, _ in windings), default=0)
+    if not (many or (windings and windings[0][2])):
         paths.append(_coasts(problem, duration, states))
     if len(paths) == 1:
         best = paths[0]
