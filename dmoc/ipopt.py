@@ -48,16 +48,22 @@ class Answer:
     seconds: float
 
 
+def tolerance(mesh: np.ndarray, degree: int, limited: bool) -> float:
+    """Of scaled rows and gradients.
+
+    Rows are momenta: an error of 1e-10 in each is one of 1e-10 N in the force, so finer meshes ask for
+    less, down to the rounding of positions over the shortest step. Without limits the last iterations
+    converge quadratically: another digit or two cost one of them at most.
+    """
+    floor = 20 * np.finfo(float).eps * degree / np.diff(mesh).min()
+    return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
+
+
 def make_solver(
     nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, watch: Watch | None = None
 ) -> ca.Function:
     """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
     parts = nlp.assembly
-    # rows are momenta: an error of 1e-10 in each is one of 1e-10 N in the force, so finer meshes ask for less,
-    # down to the rounding of positions over the shortest step
-    floor = 20 * np.finfo(float).eps * nlp.scheme.degree / np.diff(nlp.mesh).min()
-    # without limits the last iterations converge quadratically: two more digits are one of them at most
-    tolerance = max(min(1e-10 if nlp.problem.limited else 5e-12, 1e-8 / len(nlp.mesh)), floor)
     settings: dict[str, Any] = {
         "jac_g": parts.jacobian,
         "hess_lag": parts.hessian,
@@ -71,7 +77,7 @@ def make_solver(
         "ipopt.linear_solver": "mumps",
         "ipopt.nlp_scaling_method": "none",
         "ipopt.bound_relax_factor": 0.0,
-        "ipopt.tol": tolerance,
+        "ipopt.tol": tolerance(nlp.mesh, nlp.scheme.degree, nlp.problem.limited),
         "ipopt.constr_viol_tol": 1e-6,
         # where an optimum of nothing leaves a direction open, ten iterations that gain nothing are enough
         "ipopt.acceptable_iter": 10,

@@ -111,7 +111,7 @@ def work_precision(
         How often each solve is timed; the median counts.
     against : mapping or pairs
         Other methods by name: functions of (problem, steps) that give a `Formulation`. They get the
-        options and tolerances of dmoc's own solves.
+        options of dmoc's own solves, and a tolerance that is no tighter.
     reference : float, optional
         The true objective; by default that of order 8 on a fine mesh.
     cold : bool
