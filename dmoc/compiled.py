@@ -47,11 +47,11 @@ def compiler() -> str | None:
 
 def folder() -> Path | None:
     """The user's folder of libraries; None where it cannot be made or others may write to it."""
-    place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dmoc"
     try:
+        place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dmoc"
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = place.lstat()
-    except OSError:
+    except (OSError, RuntimeError):  # a user without a home
         return None
     own = hasattr(os, "geteuid") and found.st_uid == os.geteuid() and stat.S_ISDIR(found.st_mode)
     return place if own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None

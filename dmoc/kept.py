@@ -26,12 +26,12 @@ def kept(make: Callable[[], T], *key: Any) -> T:
         name = identity(key)
     except TypeError:
         return make()
-    if name not in _known:
-        _known[name] = make()
-        while len(_known) > MOST:
-            _known.popitem(last=False)
-    _known.move_to_end(name)
-    return _known[name]
+    # out and in again: those used last stand last, whatever other threads do meanwhile
+    found = _known.pop(name, None)
+    _known[name] = found = make() if found is None else found
+    while len(_known) > MOST:
+        _known.popitem(last=False)
+    return found
 
 
 def forget() -> None:
@@ -41,14 +41,17 @@ def forget() -> None:
 
 def identity(value: Any) -> Hashable:
     """Equal for values that are the same for every purpose; raises TypeError where that cannot be told."""
-    if value is None or isinstance(value, (bool, int, str)):
-        return type(value), value
-    if isinstance(value, (float, np.ndarray)):
-        array = np.asarray(value)
-        return array.shape, array.dtype.str, array.tobytes()
-    if isinstance(value, (tuple, list)):
+    # of exactly these types: what derives from them may do anything
+    kind = type(value)
+    if kind in (type(None), bool, int, str):
+        return kind, value
+    if kind is float:
+        return kind, value.hex()
+    if kind is np.ndarray and not value.dtype.hasobject:
+        return value.shape, value.dtype.str, value.tobytes()
+    if kind in (tuple, list):
         return tuple(map(identity, value))
-    kind = value if isinstance(value, type) else type(value)
+    kind = value if isinstance(value, type) else kind
     if kind.__module__.split(".")[0] != __name__.split(".")[0]:
         raise TypeError(kind)
     if isinstance(value, type):

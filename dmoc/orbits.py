@@ -225,7 +225,8 @@ class Orbit(_Around):
 
     @property
     def structure(self) -> tuple:
-        return (type(self), tuple(self._given), self.adjustable)
+        special = {name: value for name, value in self._given.items() if name not in self.adjustable}
+        return type(self), self.adjustable, tuple(special.items())
 
     def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
         planar = q.shape[0] == 2

@@ -233,6 +233,19 @@ def test_what_changes_the_rows_needs_a_rebuild():
             nlp.accepts(TransferProblem(1.0, CIRCLE, goal, 5.0, effects=GRAVITY))
 
 
+def test_counter_clockwise_and_clockwise_are_not_taken_for_each_other():
+    # both are exact values of i with rows of their own; the motion of one is that of the other in a mirror
+    def turning(sign, i):
+        goal = Orbit(1.0, a=1.5, e=0.0, i=i)
+        return TransferProblem(1.0, State((1, 0), (0, sign)), goal, 12.0, effects=GRAVITY)
+
+    problems = turning(1, 0.0), turning(-1, math.pi)
+    with pytest.raises(ValueError, match="goal"):
+        transcribe(problems[0], 50).accepts(problems[1])
+    efforts = [solve(problem, order=4, steps=60).raise_for_status().objective for problem in problems]
+    assert efforts[1] == pytest.approx(efforts[0], rel=1e-8)
+
+
 @pytest.mark.parametrize(
     "make, words",
     [

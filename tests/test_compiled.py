@@ -106,11 +106,21 @@ def test_a_library_that_is_not_as_it_was_compiled_is_not_loaded(own_folder, cont
 
 
 @needs_compiler
-def test_a_library_without_its_record_is_not_loaded(own_folder, without_compiler):
-    name = "0" * 64
-    own_folder.mkdir(parents=True, mode=0o700)
-    (own_folder / f"{name}.so").write_bytes(b"anything")
+def test_a_library_without_its_record_is_not_loaded(own_folder, request):
+    compiled(functions())
+    (library,) = libraries(own_folder)
+    library.with_suffix(".sha256").unlink()
+    request.getfixturevalue("without_compiler")
     assert not any(is_machine_code(compiled(functions())).values())
+
+
+def test_without_a_home_nothing_is_compiled(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr("dmoc.compiled.Path.home", homeless)
+    assert folder() is None
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o707])
