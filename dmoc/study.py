@@ -17,6 +17,7 @@ from dmoc.climb import Climb
 from dmoc.formulation import Formulation as Formulation
 from dmoc.formulation import Method, Run, counted, solve_other
 from dmoc.guess import starting_guess
+from dmoc.kept import forget
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
@@ -161,6 +162,8 @@ def work_precision(
 def _told(progress: Callable[[str], None] | None, labels: tuple, run: Callable[[], Run]) -> Run:
     if progress is not None:
         progress(f"{labels[0]}, {labels[2]} steps")
+    # every method builds its functions anew, as in a process of its own
+    forget()
     return run()
 
 
