@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -57,18 +58,18 @@ class NLP:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""
         old = self.problem
 
-        def kinds(parts) -> list[type]:
-            return [type(part) for part in parts]
+        def each(alike: Callable, new: tuple, known: tuple) -> bool:
+            return len(new) == len(known) and all(map(alike, new, known))
 
         same = {
             "dimension": problem.dimension == old.dimension,
-            "effects": problem.effects == old.effects,
-            "actuator": problem.actuator.structure == old.actuator.structure,
-            "objective": problem.objective == old.objective,
-            "constraints": kinds(problem.constraints) == kinds(old.constraints),
+            "effects": each(_equal, problem.effects, old.effects),
+            "actuator": _built_alike(problem.actuator, old.actuator),
+            "objective": _equal(problem.objective, old.objective),
+            "constraints": each(_built_alike, problem.constraints, old.constraints),
             "free duration": problem.free_duration == old.free_duration,
-            "start": problem.start.structure == old.start.structure,
-            "goal": problem.goal.structure == old.goal.structure,
+            "start": _built_alike(problem.start, old.start),
+            "goal": _built_alike(problem.goal, old.goal),
         }
         changed = [name for name, equal in same.items() if not equal]
         if changed:
@@ -266,6 +267,18 @@ def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]
     rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
     terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
     return ca.Function("rate", [t, q, v, u, m], [rate]), terminal
+
+
+def _built_alike(new: Any, old: Any) -> bool:
+    """Whether two parts make the same rows; a user's own may build in what it does not call adjustable."""
+    structure = [(type(part), getattr(part, "structure", None)) for part in (new, old)]
+    open_to_change = type(new).__module__.startswith("dmoc.") or new.adjustable
+    return structure[0] == structure[1] and (open_to_change or _equal(new, old))
+
+
+def _equal(new: Any, old: Any) -> bool:
+    """Equal in fields and in what a user's own class has beside those that it inherits."""
+    return type(new) is type(old) and vars(new) == vars(old)
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:

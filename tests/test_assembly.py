@@ -1,6 +1,6 @@
 """The assembled NLP has CasADi's own derivatives, a name for every place, and a graph that does not grow."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -10,7 +10,9 @@ from dmoc import (
     BallForce,
     BoxForce,
     ClohessyWiltshire,
+    Constraint,
     Engine,
+    FreeForce,
     Fuel,
     KeepIn,
     KeepOut,
@@ -19,6 +21,7 @@ from dmoc import (
     Objective,
     PointGravity,
     RotatingFrame,
+    Row,
     SpeedLimit,
     Spring,
     State,
@@ -215,6 +218,54 @@ def test_another_actuator_of_the_same_kind_is_refused(old, new):
     nlp = transcribe(in_the_plane(actuator=old), 5)
     with pytest.raises(ValueError, match="another actuator"):
         nlp.accepts(in_the_plane(actuator=new))
+
+
+@dataclass(frozen=True)
+class Ceiling(Constraint):
+    """A user's own: its height is built into its row."""
+
+    height: float
+
+    def rows(self, t, q, u, m):
+        return [Row("height", q[1] / self.height, -np.inf, 1.0)]
+
+    def excess(self, q, v):
+        return np.maximum(0.0, q[:, 1] - self.height)
+
+    def words(self):
+        return f"stays below {self.height} m"
+
+
+class Slanted(FreeForce):
+    """A user's own, with a number that is no field."""
+
+    def __init__(self, angle):
+        self.angle = angle
+
+    def force(self, u):
+        return ca.vertcat(u[0], u[1] + self.angle * u[0])
+
+
+class Weighed(PointGravity):
+    """The same for an effect."""
+
+    def __init__(self, factor):
+        super().__init__(1.2)
+        self.factor = factor
+
+    def lagrangian(self, t, q, v, m):
+        return self.factor * super().lagrangian(t, q, v, m)
+
+
+def test_what_parts_of_the_users_own_build_in_is_not_taken_for_adjustable():
+    nlp = transcribe(in_the_plane(constraints=Ceiling(2.0)), 5)
+    nlp.accepts(in_the_plane(constraints=Ceiling(2.0), duration=1.8))
+    with pytest.raises(ValueError, match="another constraints"):
+        nlp.accepts(in_the_plane(constraints=Ceiling(1.5)))
+    nlp = transcribe(in_the_plane(actuator=Slanted(0.1), effects=[Weighed(2.0)]), 5)
+    nlp.accepts(in_the_plane(actuator=Slanted(0.1), effects=[Weighed(2.0)], duration=1.8))
+    with pytest.raises(ValueError, match="another effects, actuator"):
+        nlp.accepts(in_the_plane(actuator=Slanted(0.2), effects=[Weighed(3.0)]))
 
 
 def test_new_numbers_are_accepted():
