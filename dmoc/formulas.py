@@ -61,6 +61,8 @@ class Formulas:
         self.dynamics = Dynamics.of(problem)
         self._symbols()
         self.stencils = (self._node(), self._step(), self._ends())
+        # kept for long, it must not hold on to a guess, which may be a solution on a large mesh
+        del self.problem
 
     def _symbols(self) -> None:
         problem = self.problem

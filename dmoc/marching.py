@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -128,17 +127,17 @@ def _spin(place: np.ndarray, push: np.ndarray) -> np.ndarray:
     return place[:, 0] * push[:, 1] - place[:, 1] * push[:, 0]
 
 
-def growth(methods: Sequence[str] = METHODS, reach: np.ndarray = REACH) -> list[Growth]:
+def growth() -> list[Growth]:
     """Growth of one step of several methods on x'' = -omega^2 x, for many values of h omega."""
     here = State((1,), (0,))
     case = TransferProblem(1.0, here, here, 1.0, effects=(Spring(1.0, (0.0,)),))
     dynamics, rows = Dynamics(1, case.effects), []
-    for name in methods:
-        step = step_function(name, dynamics, case).map(len(reach))
+    for name in METHODS:
+        step = step_function(name, dynamics, case).map(len(REACH))
         columns = [
-            step(np.tile(begin[:, None], len(reach)), np.zeros((1, len(reach))), reach[None]).full()
+            step(np.tile(begin[:, None], len(REACH)), np.zeros((1, len(REACH))), REACH[None]).full()
             for begin in np.eye(2)
         ]
         rates = np.abs(np.linalg.eigvals(np.stack(columns, axis=1).T))
-        rows.append(Growth(name, reach, rates.max(axis=1)))
+        rows.append(Growth(name, REACH, rates.max(axis=1)))
     return rows

@@ -142,8 +142,8 @@ def split_effects(effects: Sequence[Effect], dimension: int) -> tuple[tuple[Effe
         act = effect.lagrangian if isinstance(effect, Conservative) else effect.force  # type: ignore[attr-defined]
         return ca.depends_on(ca.SX(act(t, q, v, m)), v)
 
-    moving = tuple(effect for effect in effects if looks_at_velocity(effect))
-    return tuple(effect for effect in effects if effect not in moving), moving
+    known = [(looks_at_velocity(effect), effect) for effect in effects]
+    return tuple(e for moving, e in known if not moving), tuple(e for moving, e in known if moving)
 
 
 def step_velocities(scheme: Scheme, h, q: Sequence) -> list:

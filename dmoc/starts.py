@@ -45,7 +45,6 @@ def local_optima(
     order: int | None = None,
     hold: bool = False,
     guess: Any = None,
-    options: dict[str, Any] | None = None,
 ) -> list[Optimum]:
     """The distinct optima that `starts` guesses lead to, the best first.
 
@@ -59,7 +58,7 @@ def local_optima(
         base = starting_guess(problem, check_mesh(steps), base.order, hold, guess)
     found: list[Optimum] = []
     for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
-        climb = Climb(problem, options)
+        climb = Climb(problem)
         with climb.interrupt:
             solved = climb.up_to(start, start)
         if climb.answer.status == "stopped":

@@ -51,7 +51,6 @@ COLUMNS = {
     "solve_s": Column(np.nan, "s", "time spent in Ipopt"),
     "verify_s": Column(np.nan, "s", "time spent on checks"),
 }
-TIMINGS = ("build_s", "solve_s", "verify_s")
 
 
 def to_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any]) -> Dataset:
