@@ -56,7 +56,10 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
 ]
-Order = Annotated[int | None, typer.Option(help="2 (the default), 4, 6 or 8.")]
+Order = Annotated[
+    int | None,
+    typer.Option(help="2, 4, 6 or 8; if not given 2, in a solve around an attractor what that needs."),
+]
 Steps = Annotated[
     int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
 ]

@@ -1,7 +1,6 @@
 """What each digit costs in time: five problems, dmoc's orders, `--tol`, and methods written by hand.
 
-    ./scripts/run python scripts/accuracy.py              # the table
-    ./scripts/run python scripts/accuracy.py --readme     # and write it into the README
+    ./scripts/run python scripts/accuracy.py
 
 Under three minutes. A cell is the time from a problem to an objective with that relative error, build and
 solve, with the meshes interpolated; optima are those of `references.py`. The hand-written methods of
@@ -10,13 +9,10 @@ solve, with the meshes interpolated; optima are those of `references.py`. The ha
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
-import re
 import time
 from functools import partial
-from pathlib import Path
 from statistics import median
 
 from alternatives import METHODS, radau
@@ -27,8 +23,6 @@ from dmoc.library import load_problem
 from dmoc.problem import TransferProblem
 from dmoc.study import TARGETS, time_to_reach, work_precision
 
-README = Path(__file__).parents[1] / "README.md"
-PLACE = re.compile(r"(?<=<!-- accuracy -->\n).*?(?=<!-- end of accuracy -->)", re.DOTALL)
 HEAD = "| problem | how | " + " | ".join(f"{target:.0e}" for target in TARGETS) + " |\n"
 HEAD += "|---" * (2 + len(TARGETS)) + "|\n"
 REPEATS = 3
@@ -113,18 +107,12 @@ def rows(name: str) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--readme", action="store_true", help="write the table into the README")
-    into_readme, begun, lines = parser.parse_args().readme, time.perf_counter(), []
+    begun = time.perf_counter()
     print(HEAD, end="")
     for name in PROBLEMS:
-        lines += rows(name)
-        print("".join(lines[-4:] if PROBLEMS[name][1] else lines[-3:]), end="", flush=True)
+        print("".join(rows(name)), end="", flush=True)
     machine = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
-    note = f"\nMeasured on {machine}, medians of {REPEATS}, in {time.perf_counter() - begun:.0f} s.\n"
-    print(note, end="")
-    if into_readme:
-        README.write_text(PLACE.sub(lambda _: HEAD + "".join(lines) + note, README.read_text()))
+    print(f"\nMeasured on {machine}, medians of {REPEATS}, in {time.perf_counter() - begun:.0f} s.")
 
 
 if __name__ == "__main__":
