@@ -11,8 +11,9 @@ import numpy as np
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import node_weights, step_nodes
+from dmoc.momenta import end_momenta, legendre_momenta
 from dmoc.problem import TransferProblem
-from dmoc.simulation import end_momenta, force_of, legendre_momenta, step_matrices
+from dmoc.simulation import force_of, step_matrices
 from dmoc.solution import Solution
 
 ROUNDING = 10 * np.finfo(float).eps

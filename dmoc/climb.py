@@ -14,8 +14,9 @@ from dmoc.guess import angle_around, starting_guess
 from dmoc.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, uniform_mesh
+from dmoc.momenta import end_momenta
 from dmoc.problem import TransferProblem
-from dmoc.simulation import end_momenta, force_of
+from dmoc.simulation import force_of
 from dmoc.solution import Level, Provenance, Solution
 from dmoc.stability import flow_matrices, refuse_unstable
 from dmoc.transcription import NLP, transcribe_onto, units_of

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.export_functions import TERMS, Exported, Scene, Term, named
-from dmoc.simulation import legendre_function
+from dmoc.momenta import legendre_function
 
 
 def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:

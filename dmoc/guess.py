@@ -15,8 +15,8 @@ from dmoc.default_path import path_around, shortest_flyable
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess, node_fractions, node_weights, step_nodes, uniform_mesh
+from dmoc.momenta import legendre_momenta
 from dmoc.problem import TransferProblem
-from dmoc.simulation import legendre_momenta
 
 # How near the centre of a keep-out zone a guess is pushed aside, and how far, in radii.
 CENTRAL, PUSH = 0.05, 0.3

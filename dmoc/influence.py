@@ -24,9 +24,9 @@ from dmoc.formulas import formulas_of
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, state_symbols
 from dmoc.mesh import Guess
+from dmoc.momenta import end_momenta
 from dmoc.problem import TransferProblem
 from dmoc.reference import reference
-from dmoc.simulation import end_momenta
 from dmoc.solution import Solution
 from dmoc.transcription import transcribe_onto, units_of
 

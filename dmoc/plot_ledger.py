@@ -11,8 +11,8 @@ from dmoc.effects.base import Force
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, specific_lagrangian, state_symbols
 from dmoc.mesh import step_nodes
+from dmoc.momenta import legendre_momenta
 from dmoc.plot_style import AXIS_COLOURS, DARK, PATH, PUSH, readable
-from dmoc.simulation import legendre_momenta
 from dmoc.solution import Solution
 
 GAINED: dict[str, Any] = {"linewidth": 6, "alpha": 0.35}

@@ -13,8 +13,9 @@ from dmoc.guess import graded_guess, is_uneven, starting_guess
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, state_symbols, step_map
 from dmoc.mesh import Guess, node_weights, step_nodes
+from dmoc.momenta import end_momenta
 from dmoc.problem import TransferProblem
-from dmoc.simulation import end_momenta, reference
+from dmoc.reference import reference
 from dmoc.solution import Error, Solution
 from dmoc.transcription import check_mesh
 

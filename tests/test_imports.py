@@ -21,7 +21,7 @@ GROUPS = {
     "effects.motion effects.third_body",
     "PARTS": "actuators engines objectives constraints boundary elements orbits",
     "NLP": "problem mechanics mesh assembly formulas blocks guess transcription ipopt",
-    "MOTION": "reference simulation stability",
+    "MOTION": "momenta reference simulation stability",
     "ANSWER": "solution results climb refine solver",
     "VERDICT": "case limits optimality verification",
 }
@@ -60,14 +60,15 @@ MAY_IMPORT = {
     "assembly": "compiled",
     # motion forward in time; the guess and the refinement may use it
     "reference": "kept lobatto mechanics mesh",
-    "simulation": "checks kept lobatto mechanics mesh problem reference",
+    "momenta": "kept lobatto mechanics mesh",
+    "simulation": "checks kept lobatto mechanics mesh problem",
     "stability": "lobatto mechanics mesh simulation",
     # the way from a problem to a solution
     "spiral": "",
     "coasting": "EFFECTS boundary mechanics problem spiral",
     "tube": "coasting constraints guess mesh problem",
     "default_path": "coasting mechanics problem",
-    "guess": "BASICS coasting default_path constraints mechanics mesh problem simulation",
+    "guess": "BASICS coasting default_path constraints mechanics mesh momenta problem",
     "formulas": "BASICS assembly mechanics problem",
     "blocks": "BASICS assembly formulas mesh problem",
     "transcription": "BASICS assembly blocks guess mechanics mesh problem",
@@ -81,7 +82,7 @@ MAY_IMPORT = {
     "refine": "BASICS NLP MOTION solution climb",
     "solver": "BASICS NLP MOTION solution climb coasting refine",
     # what is judged: never with the solver's own words
-    "case": "BASICS mechanics mesh problem simulation solution",
+    "case": "BASICS mechanics mesh momenta problem simulation solution",
     "limits": "BASICS case mechanics",
     "optimality": "BASICS NLP case",
     "verification": "BASICS NLP MOTION solution case limits optimality",
@@ -108,7 +109,7 @@ MAY_IMPORT = {
     "sweeping": "__init__ library sweep_data sweep_journal sweep_loop sweep_plan sweep_pool sweep_worker",
     # what leaves the package
     "export_functions": "BASICS mechanics problem",
-    "export_residual": "export_functions simulation",
+    "export_residual": "export_functions momenta",
     "export_numbers": "BASICS problem transcription export_functions",
     "export_solver": "BASICS NLP stability export_functions export_residual export_numbers",
     "export_code": "export_functions export_solver",
@@ -116,7 +117,7 @@ MAY_IMPORT = {
     "plot_style": "BASICS mesh solution",
     "plot_scene": "BASICS EFFECTS PARTS solution plot_style",
     "plot_path": "BASICS PARTS solution plot_scene plot_style",
-    "plot_ledger": "BASICS EFFECTS mechanics mesh simulation solution plot_style",
+    "plot_ledger": "BASICS EFFECTS mechanics mesh momenta solution plot_style",
     "plot": "BASICS PARTS solution verification plot_ledger plot_path plot_style",
     "plot_front": "plot_style sweep_data sweep_plan",
     "plot_sweep": "files plot_front plot_style sweep_data",

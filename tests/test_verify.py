@@ -35,8 +35,9 @@ from dmoc.case import Case
 from dmoc.library import load_problem
 from dmoc.limits import excesses
 from dmoc.mechanics import Dynamics
+from dmoc.momenta import end_momenta
 from dmoc.optimality import stationarity
-from dmoc.simulation import end_momenta, force_of
+from dmoc.simulation import force_of
 from dmoc.verification import verify
 
 CHECKS = ["residual", "rollout", "reference", "ledger", "bounds", "optimality", "stability"]

@@ -1,0 +1,73 @@
+"""Momenta of a path: the discrete Legendre transforms of its steps."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import casadi as ca
+import numpy as np
+
+from dmoc.kept import kept
+from dmoc.lobatto import scheme
+from dmoc.mechanics import Dynamics, step_momenta
+from dmoc.mesh import Guess, step_nodes
+
+
+def end_momenta(
+    dynamics: Dynamics, path: Guess, start_time: float, momenta: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
+
+    The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
+    end what arrives there. `momenta` are the `legendre_momenta` if they are known.
+    """
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    if momenta is None:
+        momenta = legendre_momenta(dynamics, path, start_time)
+    p = np.concatenate([-momenta[0], momenta[-1][-1:]])
+    times = start_time + path.duration * path.mesh
+    v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
+    return p, np.array(v).T.reshape(-1, n)
+
+
+def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    at = step_nodes(steps, rule)
+    origin = path.position[0]
+
+    def stacked(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values[at[j]].T for j in range(rule.degree + 1)])
+
+    control = path.control.T if path.hold else stacked(path.control)
+    times = (start_time + path.duration * path.mesh[:-1])[None]
+    function = legendre_function(dynamics, path.order, path.hold)
+    lengths = path.duration * np.diff(path.mesh)[None]
+    momenta = function(stacked(path.position - origin), path.mass[at], control, times, lengths, origin)
+    return np.array([np.array(momentum).T.reshape(steps, n) for momentum in momenta])
+
+
+def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(q, m, u, t, h, origin) -> P_0 .. P_s [m/s] of one step, whole: effects, kinetic energy and actuator.
+
+    q are the s + 1 positions stacked, from `origin` [m]; u the controls of the nodes stacked, or of the step.
+    """
+    return kept(partial(_legendre_function, dynamics, order, hold), "legendre", dynamics, order, hold)
+
+
+def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    rule, n = scheme(order), dynamics.dimension
+    size = dynamics.actuator.size(n)
+    q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
+    u = ca.SX.sym("u", size * (1 if hold else rule.degree + 1))
+    t, h, origin = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("origin", n)
+    push = [
+        dynamics.actuator.force(u[:size] if hold else u[size * j : size * (j + 1)]) / m[j]
+        for j in range(rule.degree + 1)
+    ]
+
+    def point(t, r, v, m):
+        return dynamics.point(t, r + origin, v, m)
+
+    momenta = step_momenta(rule, point, t, h, ca.vertsplit(q, n), ca.vertsplit(m), push)
+    return ca.Function("legendre", [q, m, u, t, h, origin], momenta)
