@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, fields, is_dataclass, replace
 
@@ -94,8 +95,13 @@ def candidates(problem: TransferProblem) -> dict[str, Effect]:
             area, 0.3, sun, ConicalShadow(EARTH_RADIUS)
         ),
     }
-    present = {type(effect) for effect in problem.effects}
-    return {name: effect for name, effect in library.items() if type(effect) not in present}
+    return {name: new for name, new in library.items() if not any(_alike(new, old) for old in problem.effects)}
+
+
+def _alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects are of one kind, and of the same body if they are the pull of one."""
+    weights = (getattr(effect, "mu", 0.0) for effect in (one, other))
+    return type(one) is type(other) and math.isclose(*weights, rel_tol=0.01)
 
 
 def _name(effect: Effect) -> str:

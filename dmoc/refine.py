@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.climb import Climb
 from dmoc.guess import graded_guess, is_uneven, starting_guess
+from dmoc.ipopt import Answer
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, state_symbols, step_map
 from dmoc.mesh import Guess, node_weights, step_nodes
@@ -17,7 +18,7 @@ from dmoc.momenta import end_momenta
 from dmoc.problem import TransferProblem
 from dmoc.reference import reference
 from dmoc.solution import Error, Solution
-from dmoc.transcription import check_mesh
+from dmoc.transcription import NLP, check_mesh
 
 MOST_NODES, MOST_MESHES = 200_000, 14
 TRIAL_ORDER, TRIAL_STEPS = 4, 20
@@ -27,6 +28,8 @@ PARTS, SHORTEST = 4, 1e-5
 BETWEEN = 0.05
 # More switches than this are not listed.
 MOST_SWITCHES = 12
+# After so many meshes that do no better, the best one is the answer: steps have come down to rounding.
+PATIENCE = 2
 # By how much the error falls from mesh to mesh, at least.
 LEAST_FALL = 1.5
 TINY = float(np.finfo(float).tiny)
@@ -48,6 +51,8 @@ def climb_to_tolerance(
     order, reason = (order, "as asked for") if order else _best_order(problem, path, objective, tol)
     local = not _is_singular(problem, path)
     changes: list[tuple[float, float]] = []
+    best: _Found | None = None
+    worse = 0
     mesh = _as_many_nodes(path, order)
     longest = np.diff(mesh).max()
     if order != path.order and not climb.solve_on(path.onto(mesh, order, hold)):
@@ -63,7 +68,9 @@ def climb_to_tolerance(
             parts = _parts(path, errors, corners, wanted)
             most = PARTS - 1.0 if len(corners) else 2.0 ** (2 if hold else order)
         if not climb.solve_on(path.onto(_cut(path.mesh, parts), order, hold)):
-            return climb.solution(tolerance=tol)
+            if best is None or climb.answer.status == "stopped":
+                return climb.solution(tolerance=tol)
+            return _settled(climb, tol, best, f"{reason}; a finer mesh was not solved")
         changes.append(_change((path, objective), (climb.path, climb.levels[-1].objective), parts))
         error = estimate(climb, changes, most)
         rounded = rounding_cost(problem, climb.path) / max(abs(climb.levels[-1].objective), TINY)
@@ -71,10 +78,30 @@ def climb_to_tolerance(
         met = error.largest <= tol
         error = replace(error, objective=error.objective + rounded)
         climb.levels[-1] = replace(climb.levels[-1], error=error.largest)
+        found = _Found(climb.nlp, climb.answer, error)
+        worse = 0 if best is None or error.largest < best.error.largest else worse + 1
+        best = best if worse else found
+        if rounded > tol and (met or len(changes) == MOST_MESHES):
+            reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
         if met or len(climb.path.position) > MOST_NODES or len(changes) == MOST_MESHES:
-            if rounded > tol:
-                reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
-            return climb.solution(tolerance=tol, error=error, reason=_words(problem, climb.path, reason))
+            return _settled(climb, tol, best, reason)
+        if worse == PATIENCE:
+            return _settled(climb, tol, best, f"{reason}; finer meshes did no better")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An answer on one mesh, and how far off it is."""
+
+    nlp: NLP
+    answer: Answer
+    error: Error
+
+
+def _settled(climb: Climb, tol: float, best: _Found, reason: str) -> Solution:
+    """The best answer that was found, which need not be the last one."""
+    climb.nlp, climb.answer = best.nlp, best.answer
+    return climb.solution(tolerance=tol, error=best.error, reason=_words(climb.problem, climb.path, reason))
 
 
 def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) -> Guess:
@@ -115,7 +142,8 @@ def _is_singular(problem: TransferProblem, path: Guess) -> bool:
     """
     share = _shares(problem, path)
     between = np.any((share > BETWEEN) & (share < 1 - BETWEEN), axis=1)
-    return bool((between[1:-1] & between[:-2] & between[2:]).mean() > BETWEEN)
+    inside = between[1:-1] & between[:-2] & between[2:]
+    return bool(inside.sum() > BETWEEN * len(inside))
 
 
 def switch_times(problem: TransferProblem, path: Guess) -> np.ndarray:

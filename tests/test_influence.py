@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from dmoc import LinearDrag, PointGravity, State, TransferProblem, UniformGravity, solve
+from dmoc import (
+    LinearDrag,
+    PointGravity,
+    State,
+    ThirdBody,
+    TransferProblem,
+    UniformGravity,
+    circular_motion,
+    solve,
+)
 from dmoc.influence import EARTH_MU, candidates, influences
 from dmoc.report_tables import influence_table
 
@@ -44,6 +53,10 @@ def test_around_the_earth_the_library_offers_what_is_missing():
         1.5 * EARTH_MU * 1.08263e-3 * 6.378137e6**2 / radius**4, rel=1e-3
     )
     assert not candidates(TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0))
+    moon = ThirdBody(4.9028e12, circular_motion(3.844e8, 2.66e-6))
+    ends = State((7e6, 0), (0, 7546.0)), State((0, 7e6), (-7546.0, 0))
+    missing = candidates(TransferProblem(1.0, *ends, 1457.0, [PointGravity(EARTH_MU), moon]))
+    assert "ThirdBody, the Sun" in missing and "ThirdBody, the Moon" not in missing
     assert "ThirdBody, the Moon" in [row.name for row in rows]
 
 
