@@ -48,7 +48,9 @@ def compiler() -> str | None:
 def folder() -> Path | None:
     """The user's folder of libraries; None where it cannot be made or others may write to it."""
     try:
-        place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dmoc"
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        # by its specification a path that is not absolute does not count
+        place = (given if given.is_absolute() else Path.home() / ".cache") / "dmoc"
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = place.lstat()
     except (OSError, RuntimeError):  # a user without a home

@@ -48,9 +48,11 @@ def formulas_of(problem: TransferProblem, order: int, hold: bool) -> Formulas:
     """The formulas of a problem, written down once for all problems of the same structure."""
     # their types beside the structure: a user's own may call its structure what it likes
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
+    # dmoc's own have their numbers as symbols or as bounds
+    zones = [type(constraint) for constraint in problem.constraints]
     shape = problem.dimension, problem.free_duration, order, hold
     make = partial(Formulas, problem, scheme(order), hold)
-    return kept(make, "formulas", *shape, problem.effects, same, problem.objective, problem.constraints)
+    return kept(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
 class Formulas:

@@ -114,11 +114,11 @@ def test_a_library_without_its_record_is_not_loaded(own_folder, request):
     assert not any(is_machine_code(compiled(functions())).values())
 
 
-def test_without_a_home_nothing_is_compiled(monkeypatch):
+def test_a_path_that_is_not_absolute_does_not_count_and_without_a_home_nothing_is_compiled(monkeypatch):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
-    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     monkeypatch.setattr("dmoc.compiled.Path.home", homeless)
     assert folder() is None
 
