@@ -48,7 +48,7 @@ def climb_to_tolerance(
     if not climb.up_to(_first(climb, order or TRIAL_ORDER, steps, hold, guess), guess):
         return climb.solution(tolerance=tol)
     path, objective = climb.path, climb.levels[-1].objective
-    order, reason = (order, "as asked for") if order else _best_order(problem, path, objective, tol)
+    order, reason = (order, "the order as given") if order else _best_order(problem, path, objective, tol)
     local = not _is_singular(problem, path)
     changes: list[tuple[float, float]] = []
     best: _Found | None = None
@@ -79,8 +79,10 @@ def climb_to_tolerance(
         error = replace(error, objective=error.objective + rounded)
         climb.levels[-1] = replace(climb.levels[-1], error=error.largest)
         found = _Found(climb.nlp, climb.answer, error)
-        worse = 0 if best is None or error.largest < best.error.largest else worse + 1
-        best = best if worse else found
+        if best is None or error.largest < best.error.largest:
+            best, worse = found, 0
+        else:
+            worse += 1
         if rounded > tol and (met or len(changes) == MOST_MESHES):
             reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
         if met or len(climb.path.position) > MOST_NODES or len(changes) == MOST_MESHES:
@@ -203,6 +205,7 @@ def _parts(path: Guess, errors: np.ndarray, corners: np.ndarray, shortest: float
         near = slice(max(k - 1, 0), k + 2)
         wanted = np.round(np.diff(path.mesh)[near] / shortest).astype(int)
         parts[near] = np.clip(wanted, 1, PARTS)
+    parts[np.diff(path.mesh) < 2 * SHORTEST] = 1
     return parts
 
 

@@ -264,12 +264,16 @@ def _finite(value: Any) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
+NOT_MET = "The accuracy asked for is not met: this is the best that was found."
+
+
 def _accuracy(solution: Solution) -> list[Text]:
     """The estimated error and why this mesh, where a tolerance was asked for."""
     if solution.error is None:
         return []
-    error = f"estimated relative error {solution.error.largest:.1e}, asked for {solution.tolerance:g}"
-    return [Text(f"{solution.reason}; {error}")]
+    found, asked = solution.error.largest, solution.tolerance or 0.0
+    words = f"estimated relative error {found:.1e}, asked for {asked:g}"
+    return [Text(f"{solution.reason}; {words}"), *([Text(NOT_MET, "bold yellow")] if found > asked else [])]
 
 
 def _files(written: Sequence[Path]) -> list[Text]:

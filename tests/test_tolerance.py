@@ -85,3 +85,13 @@ def test_an_accuracy_beyond_the_rounding_of_the_thrust_is_not_claimed():
     found = solve(coarse, tol=1e-4)
     assert found.error.largest > 1e-4 and "rounding" in found.reason
     assert abs(found.objective / 0.0767810993 - 1) <= found.error.largest
+
+
+def test_where_finer_meshes_do_no_better_the_best_one_is_the_answer():
+    """A billionth of a switching time is beyond rounding in steps: neither minutes nor a worse answer."""
+    found = solve(load_problem("lunar_landing").make(), tol=1e-9).raise_for_status()
+    errors = [level.error for level in found.ladder if level.error is not None]
+    assert found.error.largest == min(errors) > 1e-9
+    assert "finer meshes did no better" in found.reason
+    assert found.objective == pytest.approx(8.246211251, rel=3 * found.error.largest)
+    assert len(found.ladder) < 12 and verify(found).ok
