@@ -22,6 +22,8 @@ from dmoc.problem import TransferProblem
 
 # Coasts are followed at this many places at least and at most, paths compared at this many a revolution.
 LEAST_SAMPLES, MOST_SAMPLES, A_TURN = 2000, 100_000, 100
+# More revolutions would need more memory than there is; as a rule a unit is wrong.
+MOST_TURNS = 10_000
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -51,7 +53,18 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     Where the place at one end is open it is a spiral that ends there. Else it is what needs the least
     force: coasts from both ends, blended, or an orbit that changes evenly, with the number of
     revolutions that fits the duration best or, where none fits well, one more or less.
+
+    Raises
+    ------
+    ValueError
+        If there are more than 10,000 revolutions.
     """
+    rates = orbital_rates(problem, np.stack([position for position, _ in states]))
+    if (around := duration * rates.min() / (2 * np.pi)) > MOST_TURNS:
+        raise ValueError(
+            f"on the orbits of start and goal {duration:g} s are about {around:,.0f} revolutions; "
+            "check the units of mu [m^3/s^2], positions [m] and duration [s], or give a guess"
+        )
     spiral = spiral_between(problem, duration, states)
     if spiral is not None:
         return (spiral.states(fractions)[0] + spiral.center)[:, : problem.dimension], True

@@ -137,6 +137,13 @@ def test_to_coast_costs_nothing(order):
     assert certified(orbit, order=order).objective < (1e-8 if order == 2 else 1e-20)
 
 
+def test_kilometres_for_metres_are_refused_before_they_fill_the_memory():
+    """A day at a radius of 7,000 instead of 7,000,000 is half a million revolutions."""
+    start, goal = State((7e3, 0), (0, 7.5e3)), State((0, 8e3), (-7e3, 0))
+    with pytest.raises(ValueError, match=r"about \d\d\d,\d\d\d revolutions; check the units"):
+        solve(TransferProblem(1.0, start, goal, 86400.0, effects=[PointGravity(3.986e14)]))
+
+
 ELLIPSE = Orbit(1.0, a=1.0, e=0.3, argp=0.0, center=(0, 0))
 PERIAPSIS = State((0.7, 0), (0, np.sqrt(1.3 / 0.7)))
 
