@@ -227,14 +227,21 @@ def units_of(problem: TransferProblem, guess: Guess) -> Units:
     """Canonical units of a problem near a path.
 
     Length: extent of the path, origin at its centre. Time: the duration. Force: the largest used
-    where a solution is known, else the limit, else what moves the mass that far in that time.
+    where a solution is known, else the limit, else what moves the mass that far in that time, or without
+    effects what turns it round.
     Cost: what the objective is on the path, or would be with the unit of force all the way.
     """
     low, high = guess.position.min(axis=0), guess.position.max(axis=0)
     time = guess.duration
     speed = max(np.abs(guess.start_velocity).max(), np.abs(guess.goal_velocity).max())
     length = float(np.linalg.norm(high - low)) or float(speed * time) or 1.0
-    typical = problem.mass * length / time**2
+    change = length / time
+    if not problem.effects:
+        # nothing else turns the body round
+        mean = (guess.position[-1] - guess.position[0]) / time
+        turns = np.array([guess.start_velocity, guess.goal_velocity]) - mean
+        change = max(change, float(np.linalg.norm(turns, axis=1).max()))
+    typical = problem.mass * change / time
     limit = problem.actuator.force_limit()
     force = float(np.abs(guess.control).max(initial=0.0)) if guess.multipliers else 0.0
     if limit is not None:
