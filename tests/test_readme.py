@@ -60,6 +60,7 @@ INLINE = re.findall(r"`\./scripts/run (dmoc [^`]+|python scripts/[^`]+)`", TEXT)
 ELSEWHERE = {
     "python scripts/references.py --readme": "tests/test_problems.py holds every row",
     "python scripts/effects_cost.py --readme": "it writes the README; tests/test_influence.py runs the script",
+    "python scripts/accuracy.py --readme": "it writes the README, in minutes",
     "python scripts/gallery.py": "it writes the pictures; tests/test_problems.py solves every problem",
 }
 
