@@ -86,6 +86,7 @@ def show_verdicts(rows: list[tuple[str, float, float]]) -> None:
     table = _table("against", "wanted", "found", "verdict")
     for what, wanted, found in rows:
         verdict = "met" if found >= wanted else f"missed by a factor of {wanted / found:.1f}"
+        verdict = "met: it did not get there" if math.isnan(found) else verdict
         table.add_row(what, f"{wanted:g}", f"{found:.2f}", verdict)
     _print("How many times faster", table)
 
