@@ -93,8 +93,8 @@ class Spiral:
 
 
 # The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these;
-# beyond, the speed leaves that between the orbits, by no more than a fifth.
-MOST_BENT, MOST_BEYOND = 0.9, 0.2
+# beyond, the speed leaves that between the orbits, by no more than a tenth.
+MOST_BENT, MOST_BEYOND = 0.9, 0.1
 SAMPLES_A_TURN, ROUNDS = 100, 5
 
 

@@ -312,9 +312,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(push, monkeypatch, capfd):
 
 @pytest.mark.slow
 def test_second_looks_find_better_optima_on_real_transfers(tmp_path):
-    """At 19.5 s the problem's own guess leads to an optimum 176 times worse than the one next to it."""
-    data = dmoc.sweep("orbit_raise", {"duration": "18:20:5"}, tmp_path / "out.nc")
-    assert data.objective.values[3] == pytest.approx(1.0371e-3, rel=1e-3) and data.from_neighbour.values[3]
+    """Along 8 to 20 s the revolutions change; each point ends at the same optimum from either side."""
     follow = dmoc.sweep("orbit_raise", {"duration": "8:20:25"}, tmp_path / "follow.nc", follow=True)
     cold = dmoc.sweep("orbit_raise", {"duration": "8:20:25"}, tmp_path / "cold.nc")
     assert follow.objective.values == pytest.approx(cold.objective.values, rel=1e-6)
