@@ -110,6 +110,14 @@ def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.nd
     return states
 
 
+def velocity_change_between(problem: TransferProblem, states: Any) -> float:
+    """About what many revolutions from one orbit to another take [m/s]; see `Spiral.velocity_change`."""
+    attractor = lone_attractor(problem)
+    assert attractor is not None
+    start, goal = _from_center(problem, attractor, states)
+    return Spiral(attractor.mu, np.zeros(3), 1.0, start, goal).velocity_change
+
+
 def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Spiral | None:
     """The spiral from start to goal, if one of them leaves its place open and the spiral ends there."""
     ends = (problem.start, problem.goal)

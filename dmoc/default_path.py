@@ -15,6 +15,7 @@ from dmoc.coasting import (
     lone_attractor,
     orbital_rates,
     spiral_between,
+    velocity_change_between,
     windings_between,
 )
 from dmoc.mechanics import Dynamics
@@ -36,15 +37,25 @@ def shortest_flyable(problem: TransferProblem, states: Callable[[float], Any], a
     """About the least duration in which a force limit takes a body between two states near an attractor [s].
 
     Of some durations within the bounds the first in which the default path needs no more than four times
-    the limit, in the mean square; `states` gives the states of both ends for a duration.
+    the limit, in the mean square, or from three revolutions on as long as a spiral takes; `states` gives
+    the states of both ends for a duration.
     """
-    durations, sample = np.geomspace(*problem.duration_bounds, DURATIONS), np.linspace(0.0, 1.0, 4 * A_TURN)
-    for duration in durations:
-        (q0, v0), (q1, v1) = states(duration)
-        path, _ = path_around(problem, duration, ((q0, v0), (q1, v1)), sample)
-        if np.sqrt(_needed(problem, path, duration * sample, (v0, v1))) < GENEROUS * acceleration:
+    longest, sample = problem.duration_bounds[1], np.linspace(0.0, 1.0, A_TURN * (2 + MANY_TURNS))
+    for duration in np.geomspace(*problem.duration_bounds, DURATIONS):
+        ends = states(duration)
+        if _turn_rate(problem, ends) * duration > MANY_TURNS:
+            duration = max(duration, 1.2 * velocity_change_between(problem, ends) / acceleration)
             break
-    return float(duration)
+        path, _ = path_around(problem, duration, ends, sample)
+        if np.sqrt(_needed(problem, path, duration * sample, ends)) < GENEROUS * acceleration:
+            break
+    return float(min(duration, longest))
+
+
+def _turn_rate(problem: TransferProblem, states: Any) -> float:
+    """Revolutions a second on a circle through the outer one of two places."""
+    rates = orbital_rates(problem, np.stack([position for position, _ in states]))
+    return float(rates.min() / (2 * np.pi))
 
 
 def path_around(problem: TransferProblem, duration: float, states: Any, fractions: np.ndarray) -> tuple:
@@ -59,10 +70,9 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     ValueError
         If there are more than 10,000 revolutions.
     """
-    rates = orbital_rates(problem, np.stack([position for position, _ in states]))
-    if (around := duration * rates.min() / (2 * np.pi)) > MOST_TURNS:
+    if (turns := duration * _turn_rate(problem, states)) > MOST_TURNS:
         raise ValueError(
-            f"on the orbits of start and goal {duration:g} s are about {around:,.0f} revolutions; "
+            f"on the orbits of start and goal {duration:g} s are about {turns:,.0f} revolutions; "
             "check the units of mu [m^3/s^2], positions [m] and duration [s], or give a guess"
         )
     spiral = spiral_between(problem, duration, states)
@@ -73,23 +83,21 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     if problem.free_duration and not many:
         # the duration will follow from the phase, not the other way round
         windings = []
-    paths: list[Path] = [winding for winding, _, _ in windings]
-    turns = max((turns for _, turns, _ in windings), default=0)
+    # a path, and whether it is worth its forces
+    paths: list[tuple[Path, bool]] = [(winding, True) for winding, _, _ in windings]
     if not (many or (windings and windings[0][2])):
-        paths.append(_coasts(problem, duration, states))
-    if len(paths) == 1:
-        best = paths[0]
-    else:
-        sample = np.linspace(0.0, 1.0, A_TURN * (turns + 2))
-        ends = states[0][1], states[1][1]
-        best = min(paths, key=lambda path: _needed(problem, path(sample), duration * sample, ends))
-    return best(fractions), len(paths) == len(windings) or best is not paths[-1]
+        paths.append((_coasts(problem, duration, states), False))
+    best = paths[0]
+    if len(paths) > 1:
+        sample = np.linspace(0.0, 1.0, A_TURN * (2 + max((turns for _, turns, _ in windings), default=0)))
+        best = min(paths, key=lambda path: _needed(problem, path[0](sample), duration * sample, states))
+    return best[0](fractions), best[1]
 
 
-def _needed(problem: TransferProblem, path: np.ndarray, times: np.ndarray, ends: tuple) -> float:
+def _needed(problem: TransferProblem, path: np.ndarray, times: np.ndarray, states: Any) -> float:
     """Mean square of the acceleration that a path takes beside what acts [m^2/s^4]."""
     velocity = np.gradient(path, times, axis=0)
-    velocity[0], velocity[-1] = ends
+    velocity[0], velocity[-1] = (v for _, v in states)
     given = problem.start_time + times[None], path.T, velocity.T, problem.mass, np.zeros(problem.dimension)
     acts = Dynamics.of(problem).acceleration(*given).full().T
     change = np.gradient(velocity, times, axis=0) - acts

@@ -59,10 +59,8 @@ def tolerance(mesh: np.ndarray, degree: int, limited: bool) -> float:
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
 
 
-def make_solver(
-    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, watch: Watch | None = None
-) -> ca.Function:
-    """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
+def settings_for(nlp: NLP, warm: bool = False) -> dict[str, Any]:
+    """Options of `nlpsol` and Ipopt, chosen by measurement over all problems."""
     parts = nlp.assembly
     settings: dict[str, Any] = {
         "jac_g": parts.jacobian,
@@ -104,6 +102,14 @@ def make_solver(
             "ipopt.warm_start_slack_bound_frac": 1e-8,
             "ipopt.warm_start_mult_bound_push": 1e-8,
         }
+    return settings
+
+
+def make_solver(
+    nlp: NLP, options: dict[str, Any] | None = None, warm: bool = False, watch: Watch | None = None
+) -> ca.Function:
+    """The CasADi `nlpsol` Function of an NLP, with its exact derivatives."""
+    parts, settings = nlp.assembly, settings_for(nlp, warm)
     if watch is not None:
         settings["iteration_callback"] = watch
     settings |= options or {}

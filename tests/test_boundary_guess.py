@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dmoc import (
+    BallForce,
     CircularOrbit,
     Engine,
     Orbit,
@@ -16,7 +17,7 @@ from dmoc import (
     solve,
     transcribe,
 )
-from dmoc.guess import starting_guess
+from dmoc.guess import guess_duration, starting_guess
 from dmoc.mesh import uniform_mesh
 from dmoc.spiral import Spiral
 
@@ -110,3 +111,13 @@ def test_an_orbit_whose_point_is_given_is_reached_there():
         for end in (goal, fixed)
     ]
     assert costs[0] == pytest.approx(costs[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("limit, least, most", [(0.1, 1.5, 40.0), (1e-4, 1e3, 1e4), (1e-6, 1e5, 1e6)])
+def test_a_guessed_duration_is_long_enough_for_the_thrust_however_wide_the_bounds(limit, least, most):
+    """Between circles of radius 1 and 1.5 a spiral takes 0.1835 of velocity."""
+    goal = State((1.5 * math.cos(2), 1.5 * math.sin(2)), (-math.sin(2) / 1.5**0.5, math.cos(2) / 1.5**0.5))
+    problem = TransferProblem(
+        1.0, CIRCLE, goal, (0.1, 1e9), effects=GRAVITY, actuator=BallForce(limit), objective=Time()
+    )
+    assert least < guess_duration(problem) < most

@@ -257,3 +257,11 @@ def test_rotation_keeps_a_quantity_of_the_optimum(order, hold):
     kept = cross(states[:, 0], costates_r) + cross(states[:, 1], costates_v)
     assert kept[0] == pytest.approx(kept[1], abs=1e-11)
     assert abs(kept[0]) > 1e-3
+
+
+@pytest.mark.parametrize("order", [2, 4, 8])
+def test_a_fast_body_without_effects_is_turned_round_in_one_iteration(order):
+    """Ends so fast that the way between them tells nothing of the force: 6 m |dv|^2 / T and more."""
+    start, goal = State((7e6, 0.0), (0.0, 7.5e3)), State((7e6, 1e3), (0.0, -7.5e3))
+    found = solve(TransferProblem(400.0, start, goal, 6e3), order=order, steps=100).raise_for_status()
+    assert found.iterations <= 2

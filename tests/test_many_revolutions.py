@@ -98,3 +98,20 @@ def test_other_revolutions_of_dionysus_are_other_optima():
     masses = [optimum.objective for optimum in found]
     assert masses == pytest.approx([2718.3, 2671.3, 2552.7], abs=1.0)
     assert [optimum.starts for optimum in found] == [("default",), ("+1 revolutions",), ("-1 revolutions",)]
+
+
+@pytest.mark.parametrize("duration", [9.0, 14.0, 18.0, 20.0, 24.0, 26.0, 30.0])
+def test_whatever_the_phase_the_default_guess_is_next_to_a_good_optimum(duration):
+    """Between fixed places the revolutions seldom fit: then the path swings out, to take the duration."""
+    seen = {
+        9: 1.2667e-2,
+        14: 1.7051e-3,
+        18: 1.7159e-3,
+        20: 9.2591e-4,
+        24: 1.1596e-3,
+        26: 9.5417e-4,
+        30: 5.8633e-4,
+    }
+    found = solve(load_problem("orbit_raise").make(duration=duration), order=8, steps=32).raise_for_status()
+    assert found.objective == pytest.approx(seen[duration], rel=1e-3)
+    assert found.iterations < 25
