@@ -28,6 +28,7 @@ from dmoc.solution import Solution
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"
 DPI = 90  # 1200 pixels wide
+LARGEST = 250_000
 LONG_RUNS, SWEEP = "stability", "sweep"
 VARIED = {"duration": "5:17:25", "angle": "4:14:21"}
 
@@ -37,12 +38,14 @@ def row(name: str, words: str, solution: Solution, holds: bool) -> str:
     seconds = solution.build_s + solution.solve_s
     value = f"{solution.objective:.6g} {solution.provenance.objective_unit}".replace("^2", "\u00b2").rstrip()
     found = value if holds else f"{value} (a check fails)" if solution.success else solution.status
-    cells = (f"[{name}](problems/gallery/{name}.png)", words, f"`dmoc solve {name}`", found, f"{seconds:.1f}")
+    cells = (f"[{name}](problems/gallery/{name}.png)", words, f"`dmoc solve {name}`", found, f"{seconds:.2g}")
     return f"| {' | '.join(cells)} |"
 
 
 def reduce_colors(picture: Path) -> None:
-    """A palette instead of full colour: a quarter of the size, with nearly the same hues."""
+    """A palette instead of full colour for a picture that is too large: a quarter of the size, greys a bit off."""
+    if picture.stat().st_size < LARGEST:
+        return
     with Image.open(picture) as full:
         full.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
             picture, optimize=True
