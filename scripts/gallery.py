@@ -43,7 +43,7 @@ def row(name: str, words: str, solution: Solution, holds: bool) -> str:
 
 
 def reduce_colors(picture: Path) -> None:
-    """A palette instead of full colour for a picture that is too large: a quarter of the size, greys a bit off."""
+    """A palette instead of full colour for a picture that is too large; greys are then a little off."""
     if picture.stat().st_size < LARGEST:
         return
     with Image.open(picture) as full:
