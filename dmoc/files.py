@@ -1,7 +1,8 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and that know when they were changed."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import secrets
 from collections.abc import Iterator
@@ -12,6 +13,9 @@ from dmoc.checks import short
 
 # Letters of a name; a temporary file beside it has a few more.
 LONGEST = 200
+# What stands before the checksum at the end of a sealed file.
+SEAL = b"\ndmoc sha256 "
+AGAIN = "copy it or write it again"
 
 
 def path_of(path: str | os.PathLike) -> Path:
@@ -49,3 +53,33 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def seal(path: Path) -> None:
+    """Add a checksum to the end of a finished file.
+
+    HDF5 says in its header where it ends: other readers pass over what comes after it.
+    """
+    with open(path, "rb+") as file:
+        file.write(_seal_of(file.read()))
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file has a checksum, which holds: to be asked before a library that trusts it opens it.
+
+    Raises
+    ------
+    ValueError
+        If the checksum does not hold.
+    """
+    whole = path.read_bytes()
+    length = len(_seal_of(b""))
+    found, wanted = whole[-length:], _seal_of(whole[:-length])
+    # a changed byte in the words before the checksum must not make it a file that never had one
+    if found != wanted and sum(a == b for a, b in zip(found, SEAL, strict=False)) > len(SEAL) / 2:
+        raise ValueError(f"{path} is damaged: its checksum does not hold; {AGAIN}")
+    return found == wanted
+
+
+def _seal_of(content: bytes) -> bytes:
+    return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"

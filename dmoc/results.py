@@ -3,7 +3,9 @@
 Dimensions: node, end (of a step), step, axis, channel (one a control). Every multiplier group is a
 variable of its own, `multiplier_<side>_<name>`, whose attribute `key` is its name in
 `Guess.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
-Reading takes numbers and text from the file and runs nothing.
+Reading takes numbers and text from the file and runs nothing. A checksum after the end of the HDF5
+content is verified before anything opens the file: the HDF5 library may hang on a damaged one. Files of
+format 1 have none and are read as they are.
 """
 
 from __future__ import annotations
@@ -19,15 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.files import path_of, whole_file
+from dmoc.files import AGAIN, is_sealed, path_of, seal, whole_file
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
 from dmoc.solution import Error, Level, Provenance, Solution
 
 FORMAT = "dmoc solution"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-AGAIN = "copy it or save the solution again"
 WRITTEN_BY = "results are written by Solution.save and by dmoc solve"
 
 # SI unit of the unknown or row behind each multiplier, by the last part of its name; other rows have none.
@@ -47,14 +48,18 @@ def write(solution: Solution, path: str | os.PathLike) -> None:
     plain = {name: {"_FillValue": None} for name in dataset.variables}
     with whole_file(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf", encoding=plain)
+        seal(temporary)
 
 
 def read(path: str | os.PathLike) -> Solution:
     """The solution in a file, without its problem; see `dmoc.load`."""
     file = path_of(path)
     _refuse_what_is_no_netcdf(file)
+    sealed = is_sealed(file)
     dataset = _open(file)
     _refuse_other_formats(file, dataset.attrs)
+    if dataset.attrs["format_version"] > 1 and not sealed:
+        raise ValueError(f"{file} was cut short or changed: it lacks its checksum; {AGAIN}")
     try:
         return _check_shapes(from_dataset(dataset))
     except KeyError as error:

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.files import whole_file
+from dmoc.files import AGAIN, is_sealed, seal, whole_file
 from dmoc.sweep_plan import Plan
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 FORMAT = "dmoc sweep"
-FORMAT_VERSION = 1
+# Files of format 1 have no checksum.
+FORMAT_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ def write(data: Dataset, path: str | os.PathLike) -> None:
     plain = {name: {"_FillValue": None} for name in data.variables}
     with whole_file(path) as temporary:
         data.to_netcdf(temporary, engine="h5netcdf", encoding=plain)
+        seal(temporary)
 
 
 def read(path: str | os.PathLike) -> Dataset:
@@ -97,12 +99,13 @@ def read(path: str | os.PathLike) -> Dataset:
     Raises
     ------
     ValueError
-        If the file is not there, or is not the result of a sweep.
+        If the file is not there, is not the result of a sweep, or is damaged.
     """
     import xarray
 
     if not Path(path).is_file():
         raise ValueError(f"{path} does not exist; sweeps are written by dmoc sweep")
+    sealed = is_sealed(Path(path))
     try:
         with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
             found = data.load()
@@ -112,14 +115,17 @@ def read(path: str | os.PathLike) -> Dataset:
         raise ValueError(f"{path} is not the result of a sweep; sweeps are written by dmoc sweep")
     if found.attrs["format_version"] > FORMAT_VERSION:
         raise ValueError(f"{path} comes from a newer dmoc; update dmoc")
+    if found.attrs["format_version"] > 1 and not sealed:
+        raise ValueError(f"{path} was cut short or changed: it lacks its checksum; {AGAIN}")
     return found
 
 
 def is_sweep(path: str | os.PathLike) -> bool:
-    """Whether a file says it is the result of a sweep."""
+    """Whether a file says it is the result of a sweep; ValueError if it is damaged."""
     import h5py
 
     try:
+        is_sealed(Path(path))
         with h5py.File(path, "r") as file:
             return file.attrs.get("format") == FORMAT
     except OSError:

@@ -94,3 +94,29 @@ def test_other_files_are_told_apart(tmp_path):
     write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
     with pytest.raises(ValueError, match=r"result of a sweep; draw it with: dmoc plot"):
         dmoc.load(tmp_path / "sweep.nc")
+
+
+def test_a_damaged_sweep_is_refused_before_anything_opens_it(tmp_path, capfd):
+    path = tmp_path / "out.nc"
+    write(picture(plan_of(4), lambda at: 1 + at["p0"]), path)
+    whole, random = path.read_bytes(), np.random.default_rng(0)
+    for place in random.integers(len(whole), size=40):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 255]) + whole[place + 1 :])
+        for reader in (read, is_sweep):
+            with pytest.raises(ValueError, match="is damaged: its checksum does not hold"):
+                reader(path)
+    with pytest.raises(SystemExit) as end:
+        main(["plot", str(path)])
+    assert end.value.code == 2
+    assert len(capfd.readouterr().err.splitlines()) == 1
+    path.write_bytes(whole)
+    assert read(path).identical(picture(plan_of(4), lambda at: 1 + at["p0"]))
+
+
+def test_a_sweep_of_the_first_format_has_no_checksum_and_loads(tmp_path):
+    path, data = tmp_path / "out.nc", picture(plan_of(4), lambda at: 1 + at["p0"])
+    data.assign_attrs(format_version=1).to_netcdf(path, engine="h5netcdf")
+    assert is_sweep(path) and read(path).sizes == data.sizes
+    data.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(ValueError, match="lacks its checksum"):
+        read(path)

@@ -9,6 +9,7 @@ import pytest
 import xarray
 
 from dmoc import BoxForce, KeepOut, PointGravity, SpeedLimit, State, Time, TransferProblem, load, solve
+from dmoc.files import seal
 from dmoc.results import FORMAT_VERSION, to_dataset
 
 
@@ -211,7 +212,7 @@ def test_a_truncated_file_is_refused(saved, tmp_path, kept):
     whole = saved.read_bytes()
     path = tmp_path / "cut.nc"
     path.write_bytes(whole[: int(kept * len(whole))])
-    refused(path, "cut short.*copy it or save the solution again")
+    refused(path, "cut short.*copy it or write it again")
 
 
 @pytest.mark.parametrize("content", [b"time,position\n0,1\n", b"CDF\x01", b"\x80\x04\x95pickle of something"])
@@ -221,11 +222,38 @@ def test_a_file_of_another_kind_is_refused(tmp_path, content):
     refused(path, "is not a result of dmoc: it is no netCDF-4 file")
 
 
-def edited(saved, path, change):
+def edited(saved, path, change, sealed=True):
     """A copy of a result with a changed dataset."""
     with xarray.open_dataset(saved, decode_cf=False) as dataset:
         change(dataset.load()).to_netcdf(path, engine="h5netcdf")
+    if sealed:
+        seal(path)
     return path
+
+
+def test_a_damaged_file_is_refused_before_anything_opens_it(saved, tmp_path, monkeypatch):
+    monkeypatch.setattr(xarray, "open_dataset", lambda *_, **__: pytest.fail("opened"))
+    whole, path, random = saved.read_bytes(), tmp_path / "damaged.nc", np.random.default_rng(0)
+    # every byte of the checksum itself, then any of all
+    places = [[len(whole) - 1 - i] for i in range(77)]
+    places += [random.integers(len(whole), size=random.integers(1, 9)) for _ in range(40)]
+    for place in places:
+        content = np.frombuffer(whole, np.uint8).copy()
+        content[place] ^= random.integers(1, 256, dtype=np.uint8)
+        path.write_bytes(content.tobytes())
+        refused(path, "is damaged: its checksum does not hold|it is no netCDF-4 file")
+
+
+def test_a_file_of_the_first_format_has_no_checksum_and_loads(saved, tmp_path):
+    path = edited(saved, tmp_path / "old.nc", lambda data: data.assign_attrs(format_version=1), sealed=False)
+    assert same_bits(load(path).position, load(saved).position)
+
+
+@pytest.mark.parametrize("lost", [1, 30, 77])
+def test_a_checksum_that_is_lost_is_missed(saved, tmp_path, lost):
+    path = tmp_path / "cut.nc"
+    path.write_bytes(saved.read_bytes()[:-lost])
+    refused(path, "it lacks its checksum|checksum does not hold")
 
 
 def test_netcdf_of_someone_else_is_refused(tmp_path):
