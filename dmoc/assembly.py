@@ -9,7 +9,7 @@ Hessian. Nothing here loops over the evaluations, and nothing here knows mechani
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import casadi as ca
@@ -23,62 +23,63 @@ MOST_PICKED = 8
 
 @dataclass(frozen=True)
 class Kernel:
-    """rows(z, d, p) and cost(z, d, p) of one evaluation.
+    """rows(z, d, p) and cost(z, d, p) of one evaluation, with their exact derivatives; see `kernel`.
 
     Attributes
     ----------
-    variables, data, parameters : SX columns
-        Local unknowns z, numbers d that differ between evaluations, parameters p of the NLP.
-    rows, cost : SX
-        Constraint rows (a column) and a scalar.
+    functions : dict of Function
+        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian".
+    jacobian, hessian : Sparsity
+        Of the rows, and of the upper triangle of weight cost + multipliers . rows.
+    costly : bool
+        Whether there is a cost at all.
+    slope : Function
+        (z, d, p, multipliers, weight) -> gradient of weight cost + multipliers . rows, the rows, the cost.
     """
 
     name: str
-    variables: ca.SX
-    data: ca.SX
-    parameters: ca.SX
-    rows: ca.SX
-    cost: ca.SX
-
-    @cached_property
-    def jacobian(self) -> ca.SX:
-        return ca.jacobian(self.rows, self.variables)
-
-    @cached_property
-    def hessian(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Upper triangle of the Hessian of weight cost + multipliers . rows, multipliers, weight."""
-        multipliers, weight = ca.SX.sym("lam", self.rows.numel()), ca.SX.sym("sigma")
-        lagrangian = weight * self.cost + ca.dot(multipliers, self.rows)
-        return ca.triu(ca.hessian(lagrangian, self.variables)[0]), multipliers, weight
-
-    @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """Rows, cost, and the structural nonzeros of their derivatives."""
-        arguments = [self.variables, self.data, self.parameters]
-        hessian, multipliers, weight = self.hessian
-        outputs = {
-            "rows": (arguments, ca.densify(self.rows)),
-            "cost": (arguments, ca.densify(self.cost)),
-            "gradient": (arguments, ca.densify(ca.gradient(self.cost, self.variables))),
-            "jacobian": (arguments, _nonzeros(self.jacobian)),
-            "hessian": ([*arguments, multipliers, weight], _nonzeros(hessian)),
-        }
-        return {
-            kind: ca.Function(f"{self.name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()
-        }
+    functions: dict[str, ca.Function]
+    jacobian: ca.Sparsity
+    hessian: ca.Sparsity
+    costly: bool
+    slope: ca.Function
 
     @cached_property
     def compiled(self) -> dict[str, ca.Function]:
         """The functions as machine code where that can be had."""
         return compiled(self.functions)
 
-    @cached_property
-    def slope(self) -> ca.Function:
-        """(z, d, p, multipliers) -> gradient of cost + multipliers . rows, the rows, the cost."""
-        multipliers = ca.SX.sym("lam", self.rows.numel())
-        gradient = ca.gradient(self.cost + ca.dot(multipliers, self.rows), self.variables)
-        given = [self.variables, self.data, self.parameters, multipliers]
-        return ca.Function(self.name, given, [ca.densify(part) for part in (gradient, self.rows, self.cost)])
+    def __reduce__(self) -> tuple:
+        # machine code stays where it is
+        return Kernel, tuple(getattr(self, field.name) for field in fields(self))
+
+
+def kernel(name: str, variables: ca.SX, data: ca.SX, parameters: ca.SX, rows: ca.SX, cost: ca.SX) -> Kernel:
+    """The kernel of rows (a column) and a cost (a scalar).
+
+    They are expressions of local unknowns z, numbers d that differ between evaluations and the
+    parameters p of the NLP, each a column of symbols.
+    """
+    multipliers, weight = ca.SX.sym("lam", rows.numel()), ca.SX.sym("sigma")
+    hessian, slope = ca.hessian(weight * cost + ca.dot(multipliers, rows), variables)
+    jacobian, hessian = ca.jacobian(rows, variables), ca.triu(hessian)
+    arguments = [variables, data, parameters]
+    dual = [*arguments, multipliers, weight]
+    outputs = {
+        "rows": (arguments, ca.densify(rows)),
+        "cost": (arguments, ca.densify(cost)),
+        "gradient": (arguments, ca.densify(ca.gradient(cost, variables))),
+        "jacobian": (arguments, _nonzeros(jacobian)),
+        "hessian": (dual, _nonzeros(hessian)),
+    }
+    return Kernel(
+        name,
+        {kind: ca.Function(f"{name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()},
+        jacobian.sparsity(),
+        hessian.sparsity(),
+        not cost.is_zero(),
+        ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)]),
+    )
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def assemble(
         functions = block.kernel.compiled if compiled else block.kernel.functions
         for kind, function in functions.items():
             # an output that is empty or structurally zero is not worth a map
-            if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and block.kernel.cost.is_zero()):
+            if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and not block.kernel.costly):
                 continue
             found = function.map(block.count)(*given, *(local if kind == "hessian" else ()))
             size, places = entries[kind]
@@ -204,13 +205,13 @@ def _columns(vector: ca.MX, scale: np.ndarray) -> ca.MX:
 
 def _jacobian_entries(block: Block, weight: np.ndarray, scale: np.ndarray, rows: int) -> tuple:
     """Scale and global place, column * rows + row, of every nonzero of every evaluation."""
-    row, column = block.kernel.jacobian.sparsity().get_triplet()
+    row, column = block.kernel.jacobian.get_triplet()
     return weight[row] * scale[column], block.columns[column] * rows + block.targets[row]
 
 
 def _hessian_entries(block: Block, scale: np.ndarray, columns: int) -> tuple:
     """The same for the upper triangle of the Hessian."""
-    row, column = block.kernel.hessian[0].sparsity().get_triplet()
+    row, column = block.kernel.hessian.get_triplet()
     first, second = block.columns[row], block.columns[column]
     return scale[row] * scale[column], np.maximum(first, second) * columns + np.minimum(first, second)
 

@@ -22,7 +22,7 @@ class Transcript:
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, mesh: np.ndarray, units: Any):
         self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
         formulas = formulas_of(problem, rule.order, hold)
-        self.dynamics, self.parameters = formulas.dynamics, formulas.parameters
+        self.parameter_count = formulas.parameter_count
         self.steps = len(mesh) - 1
         self.counts = {"node": self.steps * rule.degree + 1, "step": self.steps, "ends": 1}
         self.columns = self._columns()

@@ -45,20 +45,6 @@ def compiler() -> str | None:
     return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
-def folder() -> Path | None:
-    """The user's folder of libraries; None where it cannot be made or others may write to it."""
-    try:
-        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        # by its specification a path that is not absolute does not count
-        place = (given if given.is_absolute() else Path.home() / ".cache") / "dmoc"
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = place.lstat()
-    except (OSError, RuntimeError):  # a user without a home
-        return None
-    own = hasattr(os, "geteuid") and found.st_uid == os.geteuid() and stat.S_ISDIR(found.st_mode)
-    return place if own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
-
-
 def _library(functions: list[ca.Function]) -> Path | None:
     """The library of some functions, compiled if there is none that is intact."""
     place = folder()

@@ -17,7 +17,7 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.assembly import Kernel
+from dmoc.assembly import Kernel, kernel
 from dmoc.kept import kept
 from dmoc.lobatto import Scheme, scheme
 from dmoc.mechanics import Dynamics, point_function, split_effects, step_momenta, step_velocities, weighted
@@ -51,23 +51,29 @@ def formulas_of(problem: TransferProblem, order: int, hold: bool) -> Formulas:
     # dmoc's own have their numbers as symbols or as bounds
     zones = [type(constraint) for constraint in problem.constraints]
     shape = problem.dimension, problem.free_duration, order, hold
-    make = partial(Formulas, problem, scheme(order), hold)
+    make = partial(_written, problem, scheme(order), hold)
     return kept(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
+def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Formulas:
+    draft = _Formulas(problem, rule, hold)
+    return Formulas((draft.node(), draft.step(), draft.ends()), draft.parameters.numel())
+
+
+@dataclass(frozen=True)
 class Formulas:
-    """The stencils of one structure of problem at one order, and the symbols of its parameters."""
+    """The stencils of one structure of problem at one order, and how many parameters they have."""
+
+    stencils: tuple[Stencil, ...]
+    parameter_count: int
+
+
+class _Formulas:
+    """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
         self.problem, self.rule, self.hold = problem, rule, hold
         self.dynamics = Dynamics.of(problem)
-        self._symbols()
-        self.stencils = (self._node(), self._step(), self._ends())
-        # kept for long, it must not hold on to a guess, which may be a solution on a large mesh
-        del self.problem
-
-    def _symbols(self) -> None:
-        problem = self.problem
         self.origin, self.start_time = ca.SX.sym("origin", problem.dimension), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
         head = [self.origin, self.start_time, self.mass]
@@ -78,7 +84,7 @@ class Formulas:
         self.parameters = ca.vertcat(*head, *[symbol for _, symbols in twins for symbol in symbols])
         self.actuator, self.objective, self.start, self.goal, *self.constraints = [twin for twin, _ in twins]
 
-    def _node(self) -> Stencil:
+    def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
         draft, n = _Draft(self), self.problem.dimension
         r = draft.take("position", n)
@@ -98,7 +104,7 @@ class Formulas:
             draft.cost = duration * weight * self._rate(t, q, ca.DM.zeros(n), u, m)
         return draft.stencil("node")
 
-    def _step(self) -> Stencil:
+    def step(self) -> Stencil:
         """Momenta of one step; cost and limits that look at its velocities or at a held control."""
         rule, problem, n = self.rule, self.problem, self.problem.dimension
         draft, size = _Draft(self), self.actuator.size(n)
@@ -171,7 +177,7 @@ class Formulas:
         draft.limit("mass_flow", "between", [rows[-1]._replace(name="")])
         draft.limit("mass_inside", "step", rows[:-1])
 
-    def _ends(self) -> Stencil:
+    def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
         draft, n = _Draft(self), self.problem.dimension
         first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
@@ -204,7 +210,7 @@ class Formulas:
 class _Draft:
     """The unknowns, numbers and rows of one stencil while it is being written down."""
 
-    def __init__(self, formulas: Formulas):
+    def __init__(self, formulas: _Formulas):
         self.formulas, self.cost = formulas, ca.SX(0)
         self._symbols: list[ca.SX] = []
         self._unknowns: list[tuple[str, slice]] = []
@@ -242,14 +248,15 @@ class _Draft:
     def limit(self, name: str, kind: str, rows: Sequence[Row]) -> None:
         """Rows of this stencil alone."""
         if rows:
-            self._limits.append((name, kind, tuple(rows)))
+            # the expressions are in the kernel
+            self._limits.append((name, kind, tuple(row._replace(expression=None) for row in rows)))
             self.add(name, ca.vertcat(*[row.expression for row in rows]))
 
     def stencil(self, every: str) -> Stencil:
         given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.formulas.parameters
-        kernel = Kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
+        made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
         places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)
-        return Stencil(kernel, every, *places, tuple(self._limits))
+        return Stencil(made, every, *places, tuple(self._limits))
 
 
 def _title(constraint: Any, index: int) -> str:

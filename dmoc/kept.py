@@ -1,23 +1,36 @@
-"""What was written down for one scene, kept for the next solve of the same one.
+"""What was written down for one scene, kept for the next solve of the same one, in this process and later.
 
 Kept are small CasADi functions of one point, step or node, never anything that grows with the mesh.
 A scene is known again by its parts and their numbers. One that holds an object that is not dmoc's own,
 a user's effect or a function of time, is written down anew every time: what such an object does may
 have changed without its numbers having changed.
+
+At the end of a process what is new is written to the user's own folder (`cache`), under a name made of
+the scene, dmoc's source files and the versions of CasADi and Python.
 """
 
 from __future__ import annotations
 
+import atexit
+import hashlib
+import os
+import pickle
+import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from functools import cached_property, lru_cache, partial
 from typing import Any, TypeVar
 
+import casadi as ca
 import numpy as np
 
-MOST = 64
+from dmoc import cache
+
+MOST = 500
 
 T = TypeVar("T")
 _known: OrderedDict[Hashable, Any] = OrderedDict()
+_new: OrderedDict[Hashable, Any] = OrderedDict()
 
 
 def kept(make: Callable[[], T], *key: Any) -> T:
@@ -28,15 +41,59 @@ def kept(make: Callable[[], T], *key: Any) -> T:
         return make()
     # out and in again: those used last stand last, whatever other threads do meanwhile
     found = _known.pop(name, None)
-    _known[name] = found = make() if found is None else found
-    while len(_known) > MOST:
-        _known.popitem(last=False)
+    if found is None:
+        found = _read(name)
+    if found is None:
+        _new[name] = found = make()
+    _known[name] = found
+    for table in (_known, _new):
+        while len(table) > MOST:
+            table.popitem(last=False)
     return found
+
+
+class kept_property(cached_property):  # noqa: N801 - used as a decorator
+    """A property whose value is kept for all equal objects."""
+
+    def __init__(self, make: Callable[[Any], Any]):
+        super().__init__(lambda owner: kept(partial(make, owner), make.__qualname__, owner))
+        self.__doc__ = make.__doc__
 
 
 def forget() -> None:
     """Start as a new process does."""
     _known.clear()
+    _new.clear()
+
+
+@atexit.register
+def store() -> None:
+    """Write what is new to the user's folder."""
+    if not _new:
+        return
+    while _new:
+        name, value = _new.popitem()
+        cache.write(_file(name), pickle.dumps(value))
+    cache.tidy("*.functions")
+
+
+def _read(name: Hashable) -> Any:
+    content = cache.read(_file(name))
+    return None if content is None else pickle.loads(content)
+
+
+def _file(name: Hashable) -> str:
+    return hashlib.sha256(repr((_version(), name)).encode()).hexdigest() + ".functions"
+
+
+@lru_cache
+def _version() -> tuple:
+    """Of all that has a say in what is made: another one has other files."""
+    here = os.path.dirname(__file__)
+    files = [entry for place in (here, os.path.join(here, "effects")) for entry in os.scandir(place)]
+    found = [(file.path, file.stat()) for file in files if file.name.endswith(".py")]
+    sources = sorted((path, about.st_size, about.st_mtime_ns) for path, about in found)
+    return ca.CasadiMeta.version(), np.__version__, sys.version, hashlib.sha256(repr(sources).encode()).hexdigest()
 
 
 def identity(value: Any) -> Hashable:

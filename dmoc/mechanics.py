@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -33,7 +33,7 @@ import numpy as np
 
 from dmoc.actuators import Actuator, FreeForce
 from dmoc.effects.base import Conservative, Effect, Force
-from dmoc.kept import kept
+from dmoc.kept import kept, kept_property
 from dmoc.lobatto import Scheme
 
 
@@ -47,23 +47,22 @@ class Dynamics:
 
     @classmethod
     def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:
-        """What acts and pushes in a transfer problem, or some of it, with the functions made for it before."""
-        parts = problem.dimension, problem.effects if effects is None else effects, problem.actuator
-        return kept(partial(cls, *parts), "dynamics", *parts)
+        """What acts and pushes in a transfer problem, or some of it."""
+        return cls(problem.dimension, problem.effects if effects is None else effects, problem.actuator)
 
-    @cached_property
+    @kept_property
     def point(self) -> ca.Function:
         """(t, q, v, m) -> dl/dq [m/s^2], dl/dv [m/s], F/m [m/s^2] of all effects and the kinetic energy."""
         return point_function(self.effects, self.dimension, kinetic=True)
 
-    @cached_property
+    @kept_property
     def energy(self) -> ca.Function:
         """(t, q, v, m) -> v . dl/dv - l, the energy per unit mass [J/kg]."""
         t, q, v, m = state_symbols(self.dimension)
         lagrangian = 0.5 * ca.dot(v, v) + specific_lagrangian(self.effects, t, q, v, m)
         return ca.Function("energy", [t, q, v, m], [ca.dot(v, ca.gradient(lagrangian, v)) - lagrangian])
 
-    @cached_property
+    @kept_property
     def velocity(self) -> ca.Function:
         """(t, q, p, m) -> v [m/s] that belongs to the momentum p = dl/dv [m/s].
 
@@ -81,7 +80,7 @@ class Dynamics:
         at_rest = self.point(t, q, ca.DM.zeros(self.dimension), m)[1]
         return ca.Function("velocity", [t, q, p, m], [ca.solve(inertia, p - at_rest)])
 
-    @cached_property
+    @kept_property
     def acceleration(self) -> ca.Function:
         """(t, q, v, m, f) -> dv/dt [m/s^2] of the continuous motion under an actuator force f [N]."""
         t, q, v, m = state_symbols(self.dimension)
@@ -91,7 +90,7 @@ class Dynamics:
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
         return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
 
-    @cached_property
+    @kept_property
     def linearised(self) -> tuple[ca.Function, bool]:
         """(t, q, v, m) -> d(q', v')/d(q, v) of the motion without thrust, and whether it is constant."""
         t, q, v, m = state_symbols(self.dimension)
@@ -100,12 +99,12 @@ class Dynamics:
         constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v, *([m] if self.actuator.burns else [])))
         return ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)]), constant
 
-    @cached_property
+    @kept_property
     def depends_on_velocity(self) -> bool:
         """Whether an effect looks at the velocity, so that even a step of order 2 is implicit."""
         return bool(split_effects(self.effects, self.dimension)[1])
 
-    @cached_property
+    @kept_property
     def depends_on_time(self) -> bool:
         """Whether the Lagrangian depends on time, so that energy is not to be balanced."""
         t, q, v, m = state_symbols(self.dimension)

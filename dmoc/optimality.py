@@ -87,7 +87,7 @@ def _unassembled(case: Case) -> tuple[NLP, list]:
     derivatives: Any = None
     nlp = NLP(
         problem,
-        script.dynamics,
+        case.dynamics,
         case.rule,
         path.hold,
         path.mesh,
@@ -105,7 +105,8 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
     unknowns, multipliers = x * nlp.columns.scales(), lam_g * nlp.rows.scales() * nlp.units.cost
     slope, rows, cost = np.zeros(len(x)), np.zeros(len(lam_g)), 0.0
     for block in blocks:
-        values = block.kernel.slope(unknowns[block.columns], block.values, p, multipliers[block.targets])
+        duals = multipliers[block.targets], 1.0
+        values = block.kernel.slope(unknowns[block.columns], block.values, p, *duals)
         np.add.at(slope, block.columns, values[0].full())
         np.add.at(rows, block.targets, values[1].full())
         cost += float(values[2].full().sum())

@@ -197,11 +197,11 @@ def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units, compil
     rule = scheme(guess.order)
     script = Transcript(problem, rule, guess.hold, guess.mesh, units)
     columns, rows = script.columns, script.rows
-    size = int(script.parameters.numel())
-    assembly = assemble(script.blocks, columns.scales(), rows.scales(), 1 / units.cost, size, compiled)
+    scales = columns.scales(), rows.scales(), 1 / units.cost
+    assembly = assemble(script.blocks, *scales, script.parameter_count, compiled)
     return NLP(
         problem,
-        script.dynamics,
+        Dynamics.of(problem),
         rule,
         guess.hold,
         guess.mesh,

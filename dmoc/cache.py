@@ -1,0 +1,72 @@
+"""A folder of the user's own for what can be made again: functions written down, and machine code.
+
+It is `dmoc` in $XDG_CACHE_HOME or ~/.cache, and may be removed at any time. It is used only if nobody
+else may write to it; a file counts only if its content is what was written. Where there is no such
+folder everything works as well, and is made anew each time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+# The files used last are kept.
+MOST_KEPT = 500
+
+
+def folder() -> Path | None:
+    """The user's folder; None where it cannot be made or others may write to it."""
+    try:
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        # by its specification a path that is not absolute does not count
+        place = (given if given.is_absolute() else Path.home() / ".cache") / "dmoc"
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = place.lstat()
+    except (OSError, RuntimeError):  # a user without a home
+        return None
+    own = hasattr(os, "geteuid") and found.st_uid == os.geteuid() and stat.S_ISDIR(found.st_mode)
+    return place if own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
+
+
+def read(name: str) -> bytes | None:
+    """What was written under a name; None if nothing was, or not all of it is there."""
+    place = folder()
+    try:
+        content = (place / name).read_bytes() if place else b""
+        digest, content = content[:32], content[32:]
+        if digest != hashlib.sha256(content).digest():
+            return None
+        os.utime(place / name)  # type: ignore[operator]
+    except OSError:
+        return None
+    return content
+
+
+def write(name: str, content: bytes) -> None:
+    """Write under a name, whole or not at all; nothing happens where that is not possible."""
+    place = folder()
+    if place is None:
+        return
+    try:
+        with tempfile.TemporaryDirectory(dir=place) as scratch:
+            whole = Path(scratch) / name
+            whole.write_bytes(hashlib.sha256(content).digest() + content)
+            whole.replace(place / name)
+    except OSError:
+        pass
+
+
+def tidy(pattern: str) -> None:
+    """Remove the files of a pattern that were not used for longest, beyond a number."""
+    place = folder()
+    if place is None:
+        return
+    try:
+        files = sorted(place.glob(pattern), key=lambda file: -file.stat().st_mtime)
+        for old in files[MOST_KEPT:]:
+            old.unlink(missing_ok=True)
+    except OSError:
+        pass
