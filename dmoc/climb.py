@@ -153,6 +153,8 @@ class Climb:
         solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch)
         built = time.perf_counter() - begun
         answer = self.answer = run(solver, self.nlp, problem, guess)
+        if watch.error is not None:
+            raise watch.error
         steps, objective = len(guess.mesh) - 1, self.nlp.objective(answer.objective)
         counts = {"iterations": answer.iterations, "evaluations": answer.evaluations}
         times: dict[str, Any] = {"build_s": built, "solve_s": answer.seconds}

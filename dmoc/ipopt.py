@@ -214,12 +214,14 @@ class Interrupt:
 class Watch(ca.Callback):
     """Follows the iterations: tells `progress` about each, and stops when `interrupt` has seen a Ctrl-C.
 
-    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs.
+    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs. It
+    would print an exception of `progress` and go on: this stops, and keeps it as `error` to be raised.
     """
 
     def __init__(self, nlp: NLP, progress: Progress | None, interrupt: Interrupt):
         ca.Callback.__init__(self)
         self.nlp, self.progress, self.interrupt, self.iteration = nlp, progress, interrupt, 0
+        self.error: BaseException | None = None
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
@@ -237,6 +239,13 @@ class Watch(ca.Callback):
         return ca.Sparsity.dense(sizes.get(ca.nlpsol_out(i), self.nlp.assembly.p.numel()))
 
     def eval(self, arguments: list) -> list:
+        try:
+            return [int(self._told(arguments))]
+        except BaseException as error:
+            self.error = error
+            return [1]
+
+    def _told(self, arguments: list) -> bool:
         stop = self.interrupt.seen
         if self.progress is not None:
             at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
@@ -246,4 +255,4 @@ class Watch(ca.Callback):
             order = self.nlp.scheme.order
             stop |= bool(self.progress(order, steps, self.iteration, objective, *worst[0]))
         self.iteration += 1
-        return [int(stop)]
+        return stop

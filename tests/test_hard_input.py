@@ -310,7 +310,7 @@ CALLS = {
     "transcribe": (transcribe, {"problem": HERE, "steps": 4, "order": 2, "mesh": None, "guess": None}),
     "verify": (verify, {"problem": HERE}),
 }
-# None means "not given"; these functions are called in the middle of a solve, where CasADi reports what fails
+# None means "not given"; what such a function raises in the middle of a solve is what solve raises
 LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 
 
