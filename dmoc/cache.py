@@ -17,15 +17,18 @@ from pathlib import Path
 MOST_KEPT = 500
 
 
-def folder() -> Path | None:
+def folder() -> str | None:
     """The user's folder; None where it cannot be made or others may write to it."""
+    # by its specification a path that is not absolute does not count
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    place = os.path.join(given if os.path.isabs(given) else os.path.expanduser("~/.cache"), "dmoc")
     try:
-        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        # by its specification a path that is not absolute does not count
-        place = (given if given.is_absolute() else Path.home() / ".cache") / "dmoc"
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = place.lstat()
-    except (OSError, RuntimeError):  # a user without a home
+        if not os.path.isabs(place):  # a user without a home
+            return None
+        if not os.path.lexists(place):
+            os.makedirs(place, mode=0o700, exist_ok=True)
+        found = os.lstat(place)
+    except OSError:
         return None
     own = hasattr(os, "geteuid") and found.st_uid == os.geteuid() and stat.S_ISDIR(found.st_mode)
     return place if own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else None
@@ -34,15 +37,15 @@ def folder() -> Path | None:
 def read(name: str) -> bytes | None:
     """What was written under a name; None if nothing was, or not all of it is there."""
     place = folder()
+    if place is None:
+        return None
     try:
-        content = (place / name).read_bytes() if place else b""
-        digest, content = content[:32], content[32:]
-        if digest != hashlib.sha256(content).digest():
-            return None
-        os.utime(place / name)  # type: ignore[operator]
+        with open(os.path.join(place, name), "rb") as file:
+            digest, content = file.read(32), file.read()
+        os.utime(file.name)
     except OSError:
         return None
-    return content
+    return content if digest == hashlib.sha256(content).digest() else None
 
 
 def write(name: str, content: bytes) -> None:
@@ -54,7 +57,7 @@ def write(name: str, content: bytes) -> None:
         with tempfile.TemporaryDirectory(dir=place) as scratch:
             whole = Path(scratch) / name
             whole.write_bytes(hashlib.sha256(content).digest() + content)
-            whole.replace(place / name)
+            whole.replace(Path(place) / name)
     except OSError:
         pass
 
@@ -65,7 +68,7 @@ def tidy(pattern: str) -> None:
     if place is None:
         return
     try:
-        files = sorted(place.glob(pattern), key=lambda file: -file.stat().st_mtime)
+        files = sorted(Path(place).glob(pattern), key=lambda file: -file.stat().st_mtime)
         for old in files[MOST_KEPT:]:
             old.unlink(missing_ok=True)
     except OSError:

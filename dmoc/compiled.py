@@ -1,25 +1,24 @@
 """Functions as machine code, made by the computer's C compiler and kept for the next time.
 
 They are those of one node or one step: neither their source nor the time to compile it grows with the
-mesh. A library is named by its source and kept in a folder of the user's own, `dmoc` in $XDG_CACHE_HOME
-or ~/.cache. It is loaded only if nobody else may write to that folder and its content is what was
-compiled. Without a compiler, or with anything else amiss, functions stay as they are: CasADi interprets
-them, with the same result to rounding.
+mesh. A library is named by its source and kept in the user's own folder (`cache`); it is loaded only if
+its content is what was compiled. Without a compiler, or with anything else amiss, functions stay as they
+are: CasADi interprets them, with the same result to rounding.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import shutil
-import stat
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import casadi as ca
+
+from dmoc.cache import folder
 
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-O1", "-fPIC", "-shared")
@@ -55,7 +54,7 @@ def _library(functions: list[ca.Function]) -> Path | None:
         generator.add(function)
     source = generator.dump()
     made_of = "\n".join([source, *FLAGS, platform.machine(), sys.platform])
-    library = place / f"{hashlib.sha256(made_of.encode()).hexdigest()}.so"
+    library = Path(place) / f"{hashlib.sha256(made_of.encode()).hexdigest()}.so"
     return library if _intact(library) or _compile(source, library) else None
 
 

@@ -31,6 +31,7 @@ MOST = 500
 T = TypeVar("T")
 _known: OrderedDict[Hashable, Any] = OrderedDict()
 _new: OrderedDict[Hashable, Any] = OrderedDict()
+_use_files = True
 
 
 def kept(make: Callable[[], T], *key: Any) -> T:
@@ -60,10 +61,12 @@ class kept_property(cached_property):  # noqa: N801 - used as a decorator
         self.__doc__ = make.__doc__
 
 
-def forget() -> None:
-    """Start as a new process does."""
+def forget(files: bool = False) -> None:
+    """Start as a new process does, for one that measures; without `files` as the first one of all."""
+    global _use_files
     _known.clear()
     _new.clear()
+    _use_files = files
 
 
 @atexit.register
@@ -78,22 +81,23 @@ def store() -> None:
 
 
 def _read(name: Hashable) -> Any:
-    content = cache.read(_file(name))
+    content = cache.read(_file(name)) if _use_files else None
     return None if content is None else pickle.loads(content)
 
 
 def _file(name: Hashable) -> str:
-    return hashlib.sha256(repr((_version(), name)).encode()).hexdigest() + ".functions"
+    return hashlib.sha256(f"{_version()} {name}".encode()).hexdigest() + ".functions"
 
 
 @lru_cache
-def _version() -> tuple:
+def _version() -> str:
     """Of all that has a say in what is made: another one has other files."""
     here = os.path.dirname(__file__)
     files = [entry for place in (here, os.path.join(here, "effects")) for entry in os.scandir(place)]
     found = [(file.path, file.stat()) for file in files if file.name.endswith(".py")]
     sources = sorted((path, about.st_size, about.st_mtime_ns) for path, about in found)
-    return ca.CasadiMeta.version(), np.__version__, sys.version, hashlib.sha256(repr(sources).encode()).hexdigest()
+    made_of = repr((ca.CasadiMeta.version(), np.__version__, sys.version, sources))
+    return hashlib.sha256(made_of.encode()).hexdigest()
 
 
 def identity(value: Any) -> Hashable:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dmoc import solve
-from dmoc.compiled import compiled, folder
+from dmoc.compiled import compiled
 from dmoc.formulas import formulas_of
 from dmoc.kept import forget
 from dmoc.library import load_problem
@@ -114,34 +114,12 @@ def test_a_library_without_its_record_is_not_loaded(own_folder, request):
     assert not any(is_machine_code(compiled(functions())).values())
 
 
-def test_a_path_that_is_not_absolute_does_not_count_and_without_a_home_nothing_is_compiled(monkeypatch):
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
-    monkeypatch.setattr("dmoc.compiled.Path.home", homeless)
-    assert folder() is None
-
-
 @pytest.mark.parametrize("mode", [0o770, 0o707])
 def test_a_folder_that_others_may_write_to_is_not_used(own_folder, mode):
     own_folder.mkdir(parents=True)
     own_folder.chmod(mode)
-    assert folder() is None
     assert not any(is_machine_code(compiled(functions())).values())
     assert not libraries(own_folder)
-
-
-def test_a_folder_that_is_a_link_is_not_used(own_folder, tmp_path):
-    own_folder.parent.mkdir(parents=True)
-    (tmp_path / "elsewhere").mkdir()
-    own_folder.symlink_to(tmp_path / "elsewhere")
-    assert folder() is None
-
-
-def test_the_folder_is_private(own_folder):
-    assert folder() == own_folder
-    assert own_folder.stat().st_mode & 0o077 == 0
 
 
 def test_without_a_compiler_functions_stay_as_they_are(own_folder, without_compiler):
