@@ -128,9 +128,10 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
     x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
     found = make_solver(nlp, options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
-    beyond = [lower - found["x"], found["x"] - upper, row_lower - found["g"], found["g"] - row_upper]
-    outputs = _plan_of(planner, numbers, found)
-    outputs["violation"] = _largest(ca.vertcat(*beyond), ca.vertcat(found["x"], found["g"]))
+    both = ca.vertcat(found["x"], found["g"])
+    beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
+    outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
+    outputs["violation"] = _largest(beyond, both)
     guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
     name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of the positions")
     function = named(name, numbers | guesses, outputs)
@@ -141,12 +142,14 @@ def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX
     """What a solve gave, in SI units; the residual is found anew from the path."""
     path = planner.unpack(found["x"], numbers)
     path["velocities"] = velocities_of(planner.scene, path)
-    residual = ca.vec(residual_of(planner.scene, path))
+    residual = residual_of(planner.scene, path)
+    lam = _by_group(planner, ca.vertcat(found["lam_x"], found["lam_g"]), "multipliers")
     return {
         **{name: path[name] for name in planner.plan_names},
-        **_multipliers_out(planner, ca.vertcat(found["lam_x"], found["lam_g"])),
+        **{name: value * ca.DM(planner.multipliers[name]) for name, value in lam.items()},
         "objective": planner.nlp.objective(found["f"]),  # type: ignore[arg-type, dict-item]
-        "largest_residual": _largest(ca.fabs(residual), residual),
+        "residual": residual,
+        "largest_residual": _largest(ca.fabs(ca.vec(residual)), ca.vec(residual)),
     }
 
 
@@ -164,12 +167,13 @@ def nominal(planner: Planner) -> Exported:
     return Exported(named("nominal", {}, outputs), words, _solver_terms(planner))
 
 
-def _multipliers_out(planner: Planner, lam: ca.MX) -> dict[str, ca.MX]:
-    names, ones = list(planner.multipliers), list(planner.multipliers.values())
-    pieces = ca.vertsplit(lam, np.cumsum([0, *(one.size for one in ones)]).tolist())
+def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
+    """A number of every unknown and row as one matrix a group, named like its multipliers."""
+    ones = planner.multipliers
+    pieces = ca.vertsplit(values, np.cumsum([0, *(one.size for one in ones.values())]).tolist())
     return {
-        name: ca.reshape(piece, *one.shape) * ca.DM(one)
-        for name, one, piece in zip(names, ones, pieces, strict=True)
+        name.replace("multipliers", prefix, 1): ca.reshape(piece, *one.shape)
+        for (name, one), piece in zip(ones.items(), pieces, strict=True)
     }
 
 
@@ -188,14 +192,16 @@ def _solver_terms(planner: Planner) -> dict[str, Term]:
     terms = {
         "objective": Term(unit, "the objective, in its own sign"),
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
-        "violation": Term("-", "largest violation of a row or bound, relative to its scale"),
+        "violation": Term(
+            "-", "largest violation of a row or bound, relative to its scale; infinite if undefined"
+        ),
         "duration": Term("s", "duration of the transfer"),
     }
     for name in planner.multipliers:
-        words = (
-            f"multipliers of {name.removeprefix('multipliers_')}, per fraction of the duration where one a node"
-        )
+        group = name.removeprefix("multipliers_")
+        words = f"multipliers of {group}, per fraction of the duration where one a node"
         terms[name] = Term(f"{unit or '1'} per unit of the row", words)
+        terms[f"violations_{group}"] = Term("-", f"how far {group} is beyond its bounds, relative to its scale")
     plan = {name: terms.get(name) or TERMS[name] for name in (*planner.plan_names, *planner.multipliers)}
     guesses = {f"guess_{name}": Term(term.unit, f"guess: {term.words}") for name, term in plan.items()}
     return planner.numbers.terms | terms | guesses

@@ -50,7 +50,8 @@ def export(
 
     An `nlpsol` has no status output. The solver's outputs `largest_residual` [N] and `violation` [-] say
     whether a plan can be flown; whether it is an optimum, `solver.stats()["return_status"]` says, also after
-    loading.
+    loading. Where it fails, `residual` [N] and `violations_...` [-] say: the defect at every node, and each
+    bound and row in the shape of its multipliers.
 
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.
@@ -231,7 +232,8 @@ Python, with CasADi alone:
     print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
 
 The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
-(of rows and bounds, scaled) are small; that it is an optimum only the status says.
+(of rows and bounds, scaled) are small; that it is an optimum only the status says. Where a plan fails,
+`residual` [N] shows for every node, `violations_...` for every bound and row, shaped like its multipliers.
 
 To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too,
 moved on to the new times. What is no input of the solver is fixed in it.

@@ -28,6 +28,7 @@ from dmoc import (
     Time,
     TransferProblem,
     solve,
+    verify,
 )
 from dmoc.export_solver import Planner, nominal, solver
 
@@ -178,6 +179,27 @@ def test_a_plan_that_is_none_shows_in_its_outputs():
     assert float(plan["violation"]) > 1e-3
     plan = cold(**(inputs | {"mass": np.nan}))
     assert float(plan["violation"]) == np.inf or float(plan["largest_residual"]) == np.inf
+
+
+@pytest.mark.parametrize("name", ["obstacle, limits, mass, times", "orbit"])
+@pytest.mark.parametrize("order", [2, 4])
+def test_a_plan_that_fails_shows_where_as_the_solution_itself_does(name, order):
+    problem, options = OTHERS[name][0], {"ipopt.max_iter": 1}
+    inputs, cold, _ = made(problem, hold=False, order=order, options=options)
+    plan = {name: np.array(value) for name, value in cold(**inputs).items()}
+    solution = solve(problem, order=order, steps=STEPS, options=options)
+    check = next(check for check in verify(solution).checks if check.name == "residual")
+    node, axis = re.fullmatch(r"at dynamics\[(\d+)\]\.([xy])", check.note).groups()
+    assert abs(plan["residual"]["xy".index(axis), int(node)]) == pytest.approx(check.value, rel=1e-6)
+    assert np.abs(plan["residual"]).max() == pytest.approx(check.value, rel=1e-6) and check.value > 1e-4
+    assert plan["largest_residual"] == pytest.approx(check.value, rel=1e-6)
+    beyond = {name: value for name, value in plan.items() if name.startswith("violations_")}
+    worst = max(beyond, key=lambda name: beyond[name].max())
+    assert beyond[worst].max() == plan["violation"] > 1e-4
+    row = re.match(r"(?P<group>.+?)(\[(?P<index>\d+)\])?(\.[a-z]+)?$", solution.worst[0][0])
+    assert worst == f"violations_{row['group'].replace('.', '_')}"
+    assert beyond[worst].shape == plan[worst.replace("violations", "multipliers")].shape
+    assert beyond[worst].max(0).argmax() == int(row["index"] or 0)
 
 
 def test_options_reach_ipopt_and_a_plan_can_be_flown_before_it_is_the_best():
