@@ -38,6 +38,8 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     ------
     ValueError
         If the folder does not exist, or the path is itself a folder.
+    OSError
+        If the disk is full, say.
     """
     target = path_of(path)
     if not target.parent.is_dir():
@@ -51,17 +53,18 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
             # the name must not reach the disk before the contents
             os.fsync(written.fileno())
         os.replace(temporary, target)
+    except OSError as error:
+        raise OSError(f"cannot write {target}: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def seal(path: Path) -> None:
-    """Add a checksum to the end of a finished file.
+def sealed(content: bytes) -> bytes:
+    """A file's content with a checksum at its end.
 
     HDF5 says in its header where it ends: other readers pass over what comes after it.
     """
-    with open(path, "rb+") as file:
-        file.write(_seal_of(file.read()))
+    return content + _seal_of(content)
 
 
 def is_sealed(path: Path) -> bool:

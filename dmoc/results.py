@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.files import AGAIN, is_sealed, path_of, seal, whole_file
+from dmoc.files import AGAIN, is_sealed, path_of, sealed, whole_file
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
 from dmoc.solution import Error, Level, Provenance, Solution
@@ -46,19 +46,20 @@ def write(solution: Solution, path: str | os.PathLike) -> None:
     """Write a solution to a netCDF-4 file, whole or not at all; see `Solution.save`."""
     dataset = to_dataset(solution)
     plain = {name: {"_FillValue": None} for name in dataset.variables}
+    # in memory, since HDF5 may crash where a disk is full
+    content = dataset.to_netcdf(engine="h5netcdf", encoding=plain)
     with whole_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=plain)
-        seal(temporary)
+        temporary.write_bytes(sealed(bytes(content)))
 
 
 def read(path: str | os.PathLike) -> Solution:
     """The solution in a file, without its problem; see `dmoc.load`."""
     file = path_of(path)
     _refuse_what_is_no_netcdf(file)
-    sealed = is_sealed(file)
+    whole = is_sealed(file)
     dataset = _open(file)
     _refuse_other_formats(file, dataset.attrs)
-    if dataset.attrs["format_version"] > 1 and not sealed:
+    if dataset.attrs["format_version"] > 1 and not whole:
         raise ValueError(f"{file} was cut short or changed: it lacks its checksum; {AGAIN}")
     try:
         return _check_shapes(from_dataset(dataset))

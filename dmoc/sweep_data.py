@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.files import AGAIN, is_sealed, seal, whole_file
+from dmoc.files import AGAIN, is_sealed, sealed, whole_file
 from dmoc.sweep_plan import Plan
 
 if TYPE_CHECKING:
@@ -88,9 +88,10 @@ def to_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[
 def write(data: Dataset, path: str | os.PathLike) -> None:
     """Write a dataset to a netCDF-4 file, whole or not at all."""
     plain = {name: {"_FillValue": None} for name in data.variables}
+    # in memory, since HDF5 may crash where a disk is full
+    content = data.to_netcdf(engine="h5netcdf", encoding=plain)
     with whole_file(path) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf", encoding=plain)
-        seal(temporary)
+        temporary.write_bytes(sealed(bytes(content)))
 
 
 def read(path: str | os.PathLike) -> Dataset:
@@ -105,7 +106,7 @@ def read(path: str | os.PathLike) -> Dataset:
 
     if not Path(path).is_file():
         raise ValueError(f"{path} does not exist; sweeps are written by dmoc sweep")
-    sealed = is_sealed(Path(path))
+    whole = is_sealed(Path(path))
     try:
         with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
             found = data.load()
@@ -115,7 +116,7 @@ def read(path: str | os.PathLike) -> Dataset:
         raise ValueError(f"{path} is not the result of a sweep; sweeps are written by dmoc sweep")
     if found.attrs["format_version"] > FORMAT_VERSION:
         raise ValueError(f"{path} comes from a newer dmoc; update dmoc")
-    if found.attrs["format_version"] > 1 and not sealed:
+    if found.attrs["format_version"] > 1 and not whole:
         raise ValueError(f"{path} was cut short or changed: it lacks its checksum; {AGAIN}")
     return found
 

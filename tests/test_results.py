@@ -3,13 +3,15 @@
 import dataclasses
 import json
 import os
+import resource
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
 from dmoc import BoxForce, KeepOut, PointGravity, SpeedLimit, State, Time, TransferProblem, load, solve
-from dmoc.files import seal
+from dmoc.files import sealed
 from dmoc.results import FORMAT_VERSION, to_dataset
 
 
@@ -222,12 +224,12 @@ def test_a_file_of_another_kind_is_refused(tmp_path, content):
     refused(path, "is not a result of dmoc: it is no netCDF-4 file")
 
 
-def edited(saved, path, change, sealed=True):
+def edited(saved, path, change, checksum=True):
     """A copy of a result with a changed dataset."""
     with xarray.open_dataset(saved, decode_cf=False) as dataset:
         change(dataset.load()).to_netcdf(path, engine="h5netcdf")
-    if sealed:
-        seal(path)
+    if checksum:
+        path.write_bytes(sealed(path.read_bytes()))
     return path
 
 
@@ -245,7 +247,7 @@ def test_a_damaged_file_is_refused_before_anything_opens_it(saved, tmp_path, mon
 
 
 def test_a_file_of_the_first_format_has_no_checksum_and_loads(saved, tmp_path):
-    path = edited(saved, tmp_path / "old.nc", lambda data: data.assign_attrs(format_version=1), sealed=False)
+    path = edited(saved, tmp_path / "old.nc", lambda data: data.assign_attrs(format_version=1), checksum=False)
     assert same_bits(load(path).position, load(saved).position)
 
 
@@ -300,29 +302,41 @@ def test_a_missing_attribute_is_refused(saved, tmp_path):
 
 
 @pytest.mark.parametrize("before", [None, b"the former file"])
-@pytest.mark.parametrize("moment", ["to_netcdf", "fsync", "replace"])
+@pytest.mark.parametrize("moment", ["write_bytes", "fsync", "replace"])
 @pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
 def test_nothing_is_half_written(saved, tmp_path, monkeypatch, before, moment, error):
     solution, path = load(saved), tmp_path / "result.nc"
     if before is not None:
         path.write_bytes(before)
-    complete = xarray.Dataset.to_netcdf
+    complete = Path.write_bytes
 
-    def write_and_fail(self, name, *arguments, **options):
-        complete(self, name, *arguments, **options)
-        os.truncate(name, 100)
+    def write_and_fail(self, content):
+        complete(self, content[:100])
         raise error
 
     def fail(*_):
         raise error
 
-    owner, stand_in = (xarray.Dataset, write_and_fail) if moment == "to_netcdf" else (os, fail)
+    owner, stand_in = (Path, write_and_fail) if moment == "write_bytes" else (os, fail)
     monkeypatch.setattr(owner, moment, stand_in)
     with pytest.raises(type(error)):
         solution.save(path)
     monkeypatch.undo()
     assert os.listdir(tmp_path) == ([] if before is None else ["result.nc"])
     assert before is None or path.read_bytes() == before
+
+
+def test_a_full_disk_is_one_line(saved, tmp_path, capfd):
+    """A limit on the size of files stands in for it. HDF5 itself would print fifty lines and crash."""
+    solution, path = load(saved), tmp_path / "result.nc"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"^cannot write .*result\.nc: File too large$"):
+            solution.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert os.listdir(tmp_path) == [] and capfd.readouterr() == ("", "")
 
 
 def test_saving_where_nothing_can_be_written_says_so(saved, tmp_path):
