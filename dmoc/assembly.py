@@ -141,21 +141,17 @@ def assemble(
     columns, rows = len(column_scale), len(row_scale)
     x, p = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
+    unknowns, multipliers, weight = x * column_scale, lam_g * row_scale, cost_scale * lam_f
     pieces: dict[str, list] = {kind: [] for kind in ("rows", "cost", "gradient", "jacobian", "hessian")}
     for block in blocks:
-        scale, weight = column_scale[block.columns], row_scale[block.targets]
-        given = [
-            _columns(x[_order(block.columns)], scale),
-            ca.DM(block.values),
-            ca.repmat(p, 1, block.count),
-        ]
-        local = [_columns(lam_g[_order(block.targets)], weight), ca.repmat(cost_scale * lam_f, 1, block.count)]
-        entries = {
-            "rows": (weight, block.targets),
-            "cost": (None, None),
-            "gradient": (cost_scale * scale, block.columns),
-            "jacobian": _jacobian_entries(block, weight, scale, rows),
-            "hessian": _hessian_entries(block, scale, columns),
+        given = [_columns(unknowns, block.columns), ca.DM(block.values), ca.repmat(p, 1, block.count)]
+        local = [_columns(multipliers, block.targets), ca.repmat(weight, 1, block.count)]
+        places = {
+            "rows": block.targets,
+            "cost": np.zeros((1, block.count), int),
+            "gradient": block.columns,
+            "jacobian": _jacobian_places(block, rows),
+            "hessian": _hessian_places(block, columns),
         }
         functions = block.kernel.compiled if compiled else block.kernel.functions
         for kind, function in functions.items():
@@ -163,12 +159,13 @@ def assemble(
             if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and not block.kernel.costly):
                 continue
             found = function.map(block.count)(*given, *(local if kind == "hessian" else ()))
-            size, places = entries[kind]
-            pieces[kind].append((found, None) if size is None else (found * _tiled(size), places))
+            pieces[kind].append((found, places[kind]))
 
     f = cost_scale * sum((ca.sum2(piece) for piece, _ in pieces["cost"]), ca.MX(0))
-    g, slopes = _summed(pieces["rows"], rows), _summed(pieces["gradient"], columns)
-    jacobian, hessian = _matrix(pieces["jacobian"], rows, columns), _matrix(pieces["hessian"], columns, columns)
+    g = _summed(pieces["rows"], row_scale)
+    slopes = _summed(pieces["gradient"], cost_scale * column_scale)
+    jacobian = _matrix(pieces["jacobian"], row_scale, column_scale)
+    hessian = _matrix(pieces["hessian"], column_scale, column_scale)
     return Assembly(
         x,
         p,
@@ -183,50 +180,40 @@ def assemble(
     )
 
 
-def _order(indices: np.ndarray) -> list:
-    return indices.ravel(order="F").tolist()
-
-
 def _nonzeros(matrix: ca.SX) -> ca.SX:
     return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
 
 
-def _tiled(values: np.ndarray) -> ca.MX:
-    """A matrix of numbers, by one of its columns where all are the same."""
-    if (values == values[:, :1]).all():
-        return ca.repmat(ca.MX(ca.DM(values[:, 0])), 1, values.shape[1])
-    return ca.MX(ca.DM(values))
+def _columns(vector: ca.MX, places: np.ndarray) -> ca.MX:
+    """The entries of a vector at places, as a matrix of the same shape."""
+    return ca.reshape(vector[places.ravel(order="F").tolist()], *places.shape)
 
 
-def _columns(vector: ca.MX, scale: np.ndarray) -> ca.MX:
-    """A vector as a matrix, each entry times its scale."""
-    return ca.reshape(vector, *scale.shape) * _tiled(scale)
-
-
-def _jacobian_entries(block: Block, weight: np.ndarray, scale: np.ndarray, rows: int) -> tuple:
-    """Scale and global place, column * rows + row, of every nonzero of every evaluation."""
+def _jacobian_places(block: Block, rows: int) -> np.ndarray:
+    """Global place, column * rows + row, of every nonzero of every evaluation."""
     row, column = block.kernel.jacobian.get_triplet()
-    return weight[row] * scale[column], block.columns[column] * rows + block.targets[row]
+    return block.columns[column] * rows + block.targets[row]
 
 
-def _hessian_entries(block: Block, scale: np.ndarray, columns: int) -> tuple:
+def _hessian_places(block: Block, columns: int) -> np.ndarray:
     """The same for the upper triangle of the Hessian."""
     row, column = block.kernel.hessian.get_triplet()
     first, second = block.columns[row], block.columns[column]
-    return scale[row] * scale[column], np.maximum(first, second) * columns + np.minimum(first, second)
+    return np.maximum(first, second) * columns + np.minimum(first, second)
 
 
-def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], length: int) -> ca.MX:
-    """A vector whose entry i is the sum of all entries of the pieces whose place is i."""
+def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], scale: np.ndarray) -> ca.MX:
+    """A vector whose entry i is scale_i times the sum of all entries of the pieces whose place is i."""
     if not pieces:
-        return ca.MX(ca.DM.zeros(length))
+        return ca.MX(ca.DM.zeros(len(scale)))
     places = np.concatenate([place.ravel(order="F") for _, place in pieces])
-    counts = np.bincount(places, minlength=length)
-    return _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts)
+    counts = np.bincount(places, minlength=len(scale))
+    return _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts) * scale
 
 
-def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], rows: int, columns: int) -> ca.MX:
-    """The same for the nonzeros of a matrix, whose places are column * rows + row."""
+def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], row_scale: np.ndarray, column_scale: np.ndarray) -> ca.MX:
+    """The same for the nonzeros of a matrix, whose places are column * rows + row, with both their scales."""
+    rows, columns = len(row_scale), len(column_scale)
     if not pieces:
         return ca.MX(rows, columns)
     keys = np.concatenate([place.ravel(order="F") for _, place in pieces])
@@ -236,7 +223,8 @@ def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], rows: int, columns: int)
     column, row = np.divmod(keys[starts], rows)
     begins = np.searchsorted(column, np.arange(columns + 1))
     pattern = ca.Sparsity(rows, columns, begins.tolist(), row.tolist())
-    return ca.MX(pattern, _picked(pieces, order, starts, np.diff(starts, append=len(keys))))
+    picked = _picked(pieces, order, starts, np.diff(starts, append=len(keys)))
+    return ca.MX(pattern, picked * (row_scale[row] * column_scale[column]))
 
 
 def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> ca.MX:
