@@ -107,7 +107,8 @@ def attached(path: Path, source: str | None) -> Solution:
         )
     file = load_problem(source or known.problem_name)
     attached = solution.attach(file.make(**known.parameters))
-    if known.source_hash != file.source_hash:
+    # what was saved from Python does not say which file it was made from
+    if known.source_hash and known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
     return attached
 

@@ -125,7 +125,7 @@ def find(name: str) -> Path:
     if name in paths:
         return paths[name]
     hint = _nearest(name, paths) or f"; there are: {', '.join(sorted(paths)) or 'none'}"
-    raise ValueError(f"there is no problem {name!r}{hint} (dmoc list shows them all)")
+    raise ValueError(f"there is no problem {name!r}{hint}; dmoc list shows all, or give a path to a .py file")
 
 
 def load_problem(name: str) -> ProblemFile:
@@ -174,7 +174,7 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
             values[name] = ast.literal_eval(text.strip())
         except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
             raise ValueError(
-                f"--set {name}: {_short(text)} is not a Python literal; write a number (2.5), "
+                f"--set {name}: {_short(text)} is not a Python literal; write a number without a unit (2.5), "
                 "a tuple ('(8, 1, 1)'), True, None or a quoted text"
             ) from None
     return values
@@ -240,7 +240,8 @@ def _user_line(path: Path, error: BaseException) -> tuple[int, str]:
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return error.lineno or 1, (error.text or "").strip()
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    return (frames[-1].lineno or 1, (frames[-1].line or "").strip()) if frames else (1, "")
+    # a call over several lines begins with a parenthesis that closes elsewhere
+    return (frames[-1].lineno or 1, (frames[-1].line or "").strip().rstrip("(")) if frames else (1, "")
 
 
 def _check_type(name: str, value: Any, default: Any) -> None:
@@ -262,7 +263,7 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 
 def _nearest(name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+    return f" (did you mean {' or '.join(near)}?)" if near else ""
 
 
 def _short(value: Any) -> str:

@@ -159,7 +159,8 @@ def answer(
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
     """What a solve that failed shows: the worst rows by name, and what to try."""
     head = Text(f"Not solved: {solution.status} after {solution.iterations} iterations.", "bold red")
-    advice = Text(f"What to try: {solution.message}.")
+    stopped = solution.status == "stopped"
+    advice = Text("The best iterate is kept." if stopped else f"What to try: {solution.message}.")
     if quiet:
         return Group(head, advice)
     worst = _table("worst rows of the last iterate", "violation")

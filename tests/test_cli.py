@@ -299,6 +299,13 @@ def test_check_warns_when_the_problem_file_has_changed(run, folder):
     assert run("check", "push.nc", "--problem", "moved.py")[0] == 0
 
 
+def test_what_was_saved_from_python_is_checked_without_a_warning(run, folder):
+    write(folder, "push")
+    dmoc.solve(load_problem("push").make(), steps=20).save("push.nc")
+    code, _, err = run("check", "push.nc", "--problem", folder / "problems/push.py")
+    assert (code, err) == (0, "")
+
+
 def test_a_file_never_chooses_what_is_run(run, folder):
     from dmoc import load
 
