@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-import warnings
 from functools import partial
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from dmoc.adams import adams
 from dmoc.boundary import Boundary
 from dmoc.effects.base import Conservative
 from dmoc.effects.frames import RotatingFrame
 from dmoc.effects.gravity import PointGravity
+from dmoc.kept import kept
 from dmoc.mechanics import Dynamics
 from dmoc.problem import TransferProblem
 from dmoc.spiral import MOST_BENT, Spiral, Winding
 
+# A coast is followed at this many places at least.
+LEAST_SAMPLES = 2000
 # How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
 PASSES = 3
 # From so many revolutions on a path between two states winds evenly around the attractor.
@@ -51,47 +55,50 @@ def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
     return np.sqrt(squares)
 
 
-def coast(problem: TransferProblem, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
-    """Positions and velocities without thrust at times since the start [s], from the first of them on.
+def coast(
+    problem: TransferProblem, begin: float, finish: float, state: tuple, samples: int = LEAST_SAMPLES
+) -> np.ndarray | None:
+    """Positions and velocities without thrust at evenly spaced times, from a state at the first of them on.
 
-    Shape (count, 2 axes); None where the body falls into an attractor. Times may decrease.
+    Times are counted from the start [s]; `finish` may lie before `begin`. Shape (samples, 2 axes);
+    None where the body falls into an attractor.
     """
-    from scipy.integrate import ODEintWarning, odeint
-
     # without what resists: backward in time drag feeds the motion without bound
     conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
     dynamics = Dynamics.of(problem, conservative)
-    n, still = problem.dimension, np.zeros(problem.dimension)
-    centers = [center_of(attractor, n) for attractor in attractors_of(problem)]
-    least = [0.02 * math.dist(q, center) for center in centers]
-    fell_in = False
-
-    # through CasADi's buffers, without copies: the arrays they point to live as long as this call
-    acceleration = dynamics.acceleration
-    arguments = np.zeros(1), np.zeros(n), np.zeros(n), np.array([problem.mass]), still
-    pull = np.zeros(n)
-    buffer, evaluate = acceleration.buffer()
-    for i, argument in enumerate(arguments):
-        buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type]
-    buffer.set_res(0, memoryview(pull))  # type: ignore[arg-type]
-
-    def rate(t: float, state: np.ndarray) -> np.ndarray:
-        nonlocal fell_in
-        arguments[0][0], arguments[1][:], arguments[2][:] = problem.start_time + t, state[:n], state[n:]
-        evaluate()
-        for center, near in zip(centers, least, strict=True):
-            fell_in = fell_in or math.dist(state[:n], center) < near
-        return np.concatenate([state[n:], np.zeros(n) if fell_in else pull])
-
-    sizes = [np.abs(q).max() or 1.0, np.abs(v).max() or 1.0]
-    settings = {"rtol": 1e-6, "atol": 1e-9 * np.repeat(sizes, n), "mxstep": 100_000}
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ODEintWarning)
-        try:
-            states = odeint(rate, np.concatenate([q, v]), times, tfirst=True, **settings)
-        except ODEintWarning:
-            return None
+    centers = tuple(tuple(center_of(attractor, problem.dimension)) for attractor in attractors_of(problem))
+    least = [0.02 * math.dist(state[0], center) for center in centers]
+    march = kept(partial(_march, dynamics, centers, samples), "coast", dynamics, samples)
+    sizes = [float(np.abs(part).max()) or 1.0 for part in state]
+    given = problem.start_time + begin, finish - begin, problem.mass, *sizes, *least
+    scales = np.repeat(sizes, problem.dimension)
+    try:
+        states = march(x0=np.concatenate(state) / scales, p=given)["xf"].full().T * scales
+    except RuntimeError:
+        return None
+    # what has fallen in stays there
+    last = states[-1, : problem.dimension]
+    fell_in = any(math.dist(last, center) <= near for center, near in zip(centers, least, strict=True))
     return None if fell_in or not np.isfinite(states).all() else states
+
+
+def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
+    """Scaled state, (time, span, mass, scales, nearest distances) -> states of a coast.
+
+    A body that comes nearer to an attractor than that stays where it is: nothing is ever evaluated at
+    a singularity, and no step becomes endlessly small.
+    """
+    n, fraction = dynamics.dimension, ca.SX.sym("fraction")
+    state, given = ca.SX.sym("state", 2 * n), ca.SX.sym("given", 5 + len(centers))
+    time, span, mass, length, speed, *least = ca.vertsplit(given)
+    q, v = state[:n] * length, state[n:] * speed
+    pull = dynamics.acceleration(time + fraction * span, q, v, mass, ca.DM.zeros(n))
+    rate = span * ca.vertcat(v / length, pull / speed)
+    for center, near in zip(centers, least, strict=True):
+        rate = ca.if_else(ca.sumsqr(q - ca.DM(center)) <= near**2, 0, rate)
+    # more steps from one of so many places to the next are for more revolutions than a guess can have
+    motion = {"t": fraction, "x": state, "p": given, "ode": rate}
+    return adams(motion, np.linspace(0.0, 1.0, samples), tol=1e-9, most_steps=1000)
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -213,7 +220,7 @@ def _carried(problem: TransferProblem, known: tuple, begin: float, end: Boundary
 
 def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
     """A state some time later, or earlier, without thrust."""
-    states = coast(problem, np.array([begin, finish]), *state)
+    states = coast(problem, begin, finish, state)
     return state if states is None else tuple(np.split(states[-1], 2))
 
 

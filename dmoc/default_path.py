@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.coasting import (
+    LEAST_SAMPLES,
     MANY_TURNS,
     attractors_of,
     center_of,
@@ -21,8 +22,8 @@ from dmoc.coasting import (
 from dmoc.mechanics import Dynamics
 from dmoc.problem import TransferProblem
 
-# Coasts are followed at this many places at least and at most, paths compared at this many a revolution.
-LEAST_SAMPLES, MOST_SAMPLES, A_TURN = 2000, 100_000, 100
+# Coasts are followed at this many places at most, paths compared at this many a revolution.
+MOST_SAMPLES, A_TURN = 100_000, 100
 # More revolutions would need more memory than there is; as a rule a unit is wrong.
 MOST_TURNS = 10_000
 
@@ -110,8 +111,8 @@ def _coasts(problem: TransferProblem, duration: float, states: Any) -> Path:
     attractors = attractors_of(problem)
     turns = duration * orbital_rates(problem, np.stack([q0, q1])).max()
     sample = np.linspace(0.0, 1.0, int(np.clip(20 * turns, LEAST_SAMPLES, MOST_SAMPLES)))
-    forward = coast(problem, duration * sample, q0, v0)
-    backward = coast(problem, duration * sample[::-1], q1, v1)
+    forward = coast(problem, 0.0, duration, (q0, v0), len(sample))
+    backward = coast(problem, duration, 0.0, (q1, v1), len(sample))
     if forward is None or backward is None:
         return lambda at: _keep_clear(q0 + at[:, None] * (q1 - q0), attractors, q0, q1)
     arcs = [forward[:, : problem.dimension], backward[::-1, : problem.dimension]]

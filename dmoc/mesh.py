@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dmoc.lobatto import Scheme, scheme
+from dmoc.splines import cubic_spline
 
 
 def uniform_mesh(steps: int) -> np.ndarray:
@@ -66,8 +67,6 @@ class Guess:
 
     def onto(self, mesh: np.ndarray, order: int, hold: bool) -> Guess:
         """The same path on another mesh, order and kind of control."""
-        from scipy.interpolate import CubicSpline
-
         if order == self.order and hold == self.hold and np.array_equal(mesh, self.mesh):
             return self
         old, new = self.fractions, node_fractions(mesh, scheme(order))
@@ -76,7 +75,7 @@ class Guess:
         new_control = middles if hold else new
         ends = (self.start_velocity * self.duration, self.goal_velocity * self.duration)
         # the path must be smooth: its second differences are the forces
-        position = CubicSpline(old, self.position, bc_type=((1, ends[0]), (1, ends[1])))(new)
+        position = cubic_spline(old, self.position, ends)(new)
         position[0], position[-1] = self.position[0], self.position[-1]
         places = {
             "node": (old, new),
@@ -97,11 +96,9 @@ class Guess:
 
 
 def _carry(name: str, value: np.ndarray, places: dict) -> np.ndarray:
-    from scipy.interpolate import CubicSpline
-
     kind = name.split(":")[0]
     if kind == "smooth":
-        return CubicSpline(places["node"][0], value)(places["node"][1])
+        return cubic_spline(places["node"][0], value)(places["node"][1])
     return _between(places[kind][0], value, places[kind][1]) if kind in places else value
 
 

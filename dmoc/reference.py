@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -86,8 +88,7 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     `control` the coefficients of `_control_powers`; a part is `share` of a step of length h [s] that
     starts at t [s], from the fraction `begin` on.
     """
-    from scipy.integrate import DOP853
-
+    places, rows, *weights = coefficients()
     n, count = dynamics.dimension, dynamics.actuator.size(dynamics.dimension)
     state, powers = ca.SX.sym("state", 2 * n + 1), ca.SX.sym("control", size)
     t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
@@ -102,12 +103,35 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
 
     length = share * h
     slopes: list[ca.SX] = []
-    for row, place in zip(DOP853.A, DOP853.C, strict=True):
+    for place, row in zip(places, rows, strict=True):
         moved = weighted(row[: len(slopes)], slopes)
         slopes.append(rate(begin + place * share, state + length * moved))
-    after = state + length * weighted(DOP853.B, slopes)
+    after = state + length * weighted(weights[0], slopes)
     slopes.append(rate(begin + share, after))
     scale = tolerances + 1e-11 * ca.fmax(ca.fabs(state), ca.fabs(after))
-    fifth, third = (ca.sumsqr(weighted(row, slopes) / scale) for row in (DOP853.E5, DOP853.E3))
+    third, fifth = (ca.sumsqr(weighted(row, slopes) / scale) for row in weights[1:])
     error = length * fifth / ca.sqrt((fifth + 0.01 * third) * state.numel() + 1e-300)
     return ca.Function("dop853", [state, powers, t, h, begin, share, origin, tolerances], [after, error])
+
+
+def coefficients() -> tuple[np.ndarray, ...]:
+    """Of DOP853: places, slopes and weights of its stages, weights of its third and fifth order errors.
+
+    They are SciPy's. Its integrators take as long to import as a small solve, so their table is read alone.
+    """
+    try:
+        table = _scipys_table()
+        stages = len(table.B)
+        return table.C[:stages], table.A[:stages, :stages], table.B, table.E3, table.E5
+    except (AttributeError, ImportError, OSError):
+        from scipy.integrate import DOP853
+
+        return DOP853.C, DOP853.A, DOP853.B, DOP853.E3, DOP853.E5
+
+
+def _scipys_table() -> Any:
+    folder = find_spec("scipy").submodule_search_locations[0]  # type: ignore[union-attr, index]
+    spec = spec_from_file_location("dop853", f"{folder}/integrate/_ivp/dop853_coefficients.py")
+    table = module_from_spec(spec)  # type: ignore[arg-type]
+    spec.loader.exec_module(table)  # type: ignore[union-attr]
+    return table

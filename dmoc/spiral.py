@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
+
+from dmoc.adams import adams
+from dmoc.kept import kept
+from dmoc.splines import cubic_spline
 
 
 @dataclass(frozen=True)
@@ -48,37 +54,23 @@ class Spiral:
         return float(circles + 0.5 * fast * np.linalg.norm(e[1] - e[0]))
 
     def states(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s] of the orbits of the moment, shape (count, 3)."""
-        from scipy.integrate import solve_ivp
+        """Positions [m] and velocities [m/s] of the orbits of the moment, shape (count, 3).
 
-        begin, end, place = (1.0, 0.0, self.goal[0]) if self.from_goal else (0.0, 1.0, self.start[0])
-        settings = {"method": "DOP853", "rtol": 1e-7, "atol": 1e-9, "dense_output": True}
-        arc = solve_ivp(self._turn, (begin, end), place / np.linalg.norm(place), **settings)
-        h, e = self._orbits(fractions)
-        u, r = self._places(h, e, arc.sol(fractions).T)
-        return r * u, self.mu / (h * h).sum(axis=1, keepdims=True) * np.cross(h, e + u)
-
-    def _turn(self, fraction: float, direction: np.ndarray) -> np.ndarray:
-        h, e = self._orbits(np.array([fraction]))
-        _, r = self._places(h, e, direction[None])
-        (x, y, z), (a, b, c) = h[0], direction
-        return np.array([y * c - z * b, z * a - x * c, x * b - y * a]) * (self.duration / r[0, 0] ** 2)
-
-    def _places(self, h: np.ndarray, e: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit vectors in the planes of the orbits, and the distances there."""
-        square = (h * h).sum(axis=1, keepdims=True)
-        u = direction - h * ((h * direction).sum(axis=1, keepdims=True) / square)
-        u = u / np.sqrt((u * u).sum(axis=1, keepdims=True))
-        return u, square / self.mu / np.maximum(1 + (e * u).sum(axis=1, keepdims=True), 0.05)
-
-    def _orbits(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """h and e of each moment: the length of h does not shrink as it tilts, and e stays in the plane."""
-        h, e = self._elements
-        share = np.stack([1 - fractions, fractions], axis=1)
-        h_now, e_now, length = share @ h, share @ e, share @ self._spins
-        square = (h_now * h_now).sum(axis=1)
-        e_now = e_now - h_now * ((h_now * e_now).sum(axis=1) / square)[:, None]
-        return h_now * (length / np.sqrt(square))[:, None], e_now
+        At increasing fractions of the duration. NaN where there is no angular momentum.
+        """
+        turning = kept(_turning, "turning")
+        constants = np.concatenate(self._elements).T, self.mu, self.duration
+        begin, sign, place = (1.0, -1, self.goal[0]) if self.from_goal else (0.0, 1, self.start[0])
+        passed, direction = ca.SX.sym("passed"), ca.SX.sym("direction", 3)
+        rate = sign * turning(begin + sign * passed, direction, *constants)[0]
+        motion = {"t": passed, "x": direction, "ode": rate}
+        march = adams(motion, (sign * (fractions - begin))[::sign], tol=1e-9, most_steps=10_000_000)
+        try:
+            directions = march(x0=place / np.linalg.norm(place))["xf"].full()[:, ::sign]
+        except RuntimeError:
+            directions = np.full((3, len(fractions)), np.nan)
+        _, q, v = turning(fractions[None], directions, *constants)
+        return q.full().T, v.full().T
 
     @cached_property
     def _elements(self) -> tuple[np.ndarray, np.ndarray]:
@@ -87,9 +79,23 @@ class Spiral:
         h = np.cross(q, v)
         return h, np.cross(v, h) / self.mu - q / np.linalg.norm(q, axis=1, keepdims=True)
 
-    @cached_property
-    def _spins(self) -> np.ndarray:
-        return np.linalg.norm(self._elements[0], axis=1)
+
+def _turning() -> ca.Function:
+    """Fraction, direction, h and e of both ends, mu, duration -> rate of the direction, position, velocity."""
+    fraction, direction, ends = ca.SX.sym("fraction"), ca.SX.sym("direction", 3), ca.SX.sym("ends", 3, 4)
+    mu, duration = ca.SX.sym("mu"), ca.SX.sym("duration")
+    share = ca.vertcat(1 - fraction, fraction)
+    h, e = ends[:, :2] @ share, ends[:, 2:] @ share
+    # the length of h does not shrink as it tilts, and e and the direction stay in the plane
+    h = h * (ca.dot(share, ca.vertcat(ca.norm_2(ends[:, 0]), ca.norm_2(ends[:, 1]))) / ca.norm_2(h))
+    square = ca.sumsqr(h)
+    e = e - h * (ca.dot(h, e) / square)
+    u = direction - h * (ca.dot(h, direction) / square)
+    u = u / ca.norm_2(u)
+    r = square / mu / ca.fmax(1 + ca.dot(e, u), 0.05)
+    rate = duration / r**2 * ca.cross(h, direction)
+    given = [fraction, direction, ends, mu, duration]
+    return ca.Function("turning", given, [rate, r * u, mu / square * ca.cross(h, e + u)])
 
 
 # The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these;
@@ -120,10 +126,10 @@ class Winding:
 
     def positions(self, fractions: np.ndarray) -> np.ndarray:
         """At these fractions of the duration, shape (count, 3) [m]."""
-        from scipy.interpolate import CubicSpline
-
         at, times = self._times(self.turns, self.bend)
-        elements, longitude = self._orbits(CubicSpline(times / times[-1], at)(fractions), self.turns, self.bend)
+        elements, longitude = self._orbits(
+            cubic_spline(times / times[-1], at)(fractions), self.turns, self.bend
+        )
         radius, axes = self._radius(elements, longitude), _axes(*elements[3:])
         return radius[:, None] * (axes[0] * np.cos(longitude) + axes[1] * np.sin(longitude)).T @ self._frame
 
@@ -149,7 +155,6 @@ class Winding:
     @cached_property
     def bend(self) -> float:
         """How much earlier than evenly the orbit changes; beyond 0.9, how far above or below both orbits."""
-        from scipy.optimize import brentq
 
         def excess(bend: float) -> float:
             return self._time(self.turns, bend) - self.duration
@@ -159,7 +164,7 @@ class Winding:
         most = MOST_BENT + MOST_BEYOND
         if excess(-most) * excess(most) > 0:
             return min(0.0, -most, most, key=lambda bend: abs(excess(bend)))
-        return float(brentq(excess, -most, most, xtol=1e-6))
+        return _root(excess, -most, most, 1e-6)
 
     def _time(self, turns: int, bend: float = 0.0) -> float:
         return float(self._times(turns, bend)[1][-1])
@@ -201,12 +206,10 @@ class Winding:
     @cached_property
     def _even(self) -> Any:
         """Fractions of the time at those of the angle: dL/dt = V^3/mu on a circle."""
-        from scipy.interpolate import CubicSpline
-
         time = np.linspace(0.0, 1.0, SAMPLES_A_TURN + 1)
         pace = self._line(time)[0] ** 3
         angle = np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1])))
-        return CubicSpline(angle / angle[-1], time)
+        return cubic_spline(angle / angle[-1], time)
 
     @staticmethod
     def _radius(elements: np.ndarray, longitude: np.ndarray) -> np.ndarray:
@@ -242,3 +245,17 @@ def _axes(h: Any, k: Any) -> tuple[np.ndarray, np.ndarray]:
     square = 1 + h * h + k * k
     first = np.array([1 + h * h - k * k, 2 * h * k, -2 * k]) / square
     return first, np.array([2 * h * k, 1 - h * h + k * k, 2 * h]) / square
+
+
+def _root(function: Callable[[float], float], a: float, b: float, tol: float) -> float:
+    """Where a function changes its sign between a and b: false position by the Illinois rule.
+
+    M. Dowell, P. Jarratt, BIT 11 (1971): an end that stays counts half, so that both come closer.
+    """
+    at_a, at_b = function(a), function(b)
+    while at_b and abs(b - a) > tol:
+        c = b - at_b * (b - a) / (at_b - at_a)
+        at_c = function(c)
+        a, at_a = (b, at_b) if at_b * at_c < 0 else (a, 0.5 * at_a)
+        b, at_b = c, at_c
+    return b

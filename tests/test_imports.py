@@ -38,6 +38,8 @@ MAY_IMPORT = {
     "layout": "",
     "lobatto": "checks",
     "rows": "",
+    "splines": "",
+    "adams": "",
     # what acts, what pushes, what is minimised, what is forbidden, where it starts and ends
     "effects.base": "docstrings",
     "effects.gravity": "checks effects.base",
@@ -57,7 +59,7 @@ MAY_IMPORT = {
     "problem": "actuators boundary checks constraints effects.base effects.motion objectives rows",
     # the discrete equations, which know nothing of a transfer
     "mechanics": "actuators effects.base kept lobatto",
-    "mesh": "lobatto",
+    "mesh": "lobatto splines",
     "assembly": "compiled",
     # motion forward in time; the guess and the refinement may use it
     "reference": "kept lobatto mechanics mesh",
@@ -65,8 +67,8 @@ MAY_IMPORT = {
     "simulation": "checks kept lobatto mechanics mesh problem",
     "stability": "lobatto mechanics mesh simulation",
     # the way from a problem to a solution
-    "spiral": "",
-    "coasting": "EFFECTS boundary mechanics problem spiral",
+    "spiral": "adams kept splines",
+    "coasting": "EFFECTS adams boundary kept mechanics problem spiral",
     "tube": "coasting constraints guess mesh problem",
     "default_path": "coasting mechanics problem",
     "guess": "BASICS coasting default_path constraints mechanics mesh momenta problem",
