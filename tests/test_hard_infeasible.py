@@ -54,6 +54,12 @@ LIMITED = {
     "one axis": (lambda f: rest_to_rest([1.0], 1.9, actuator=BoxForce(f)), 1.0, 4 / 1.9**2),
     "drone": (lambda f: named("drone_hop", limit=f), 11.0, None),
     "too weak to hover": (lambda f: named("drone_hop", limit=f), 9.0, None),
+    # a mistaken unit: a thousand times too small
+    "kN for N": (
+        lambda f: rest_to_rest((4.0, 1.0), 4.0, actuator=BallForce(f)),
+        1e-3,
+        4 * np.hypot(4, 1) / 4**2,
+    ),
     "past three obstacles": (lambda f: named("free_flyer", limit=f), 0.05, 0.2),
     "between orbits": (lambda f: replace(named("orbit_raise"), actuator=BallForce(f)), 0.005, None),
     "between orbits, each axis": (lambda f: replace(named("orbit_raise"), actuator=BoxForce(f)), 0.005, None),
