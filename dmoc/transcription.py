@@ -256,7 +256,7 @@ def _cost(problem: TransferProblem, guess: Guess, force: float) -> float:
     parts = problem.dimension, problem.objective, problem.actuator
     rate, terminal = kept(partial(_cost_functions, problem), "cost", *parts)
     # a few hundred nodes tell the size
-    some = np.unique(np.linspace(0, len(guess.position) - 1, 400).astype(int))
+    some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), 400)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]
     velocity = np.gradient(guess.position[some], times, axis=0)
     nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
