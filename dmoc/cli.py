@@ -110,7 +110,6 @@ def solve(
     """Solve a problem, check the answer, show both."""
     import dmoc
     from dmoc import report
-    from dmoc.verification import verify
 
     writable(out)
     writable(plot, drawn=True)
@@ -124,6 +123,8 @@ def solve(
         with report.live_line(not (as_json or quiet), unit) as progress:
             numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold, "compiled": compiled}
             solution = dmoc.solve(case, guess=start, progress=progress, **numerics)
+        from dmoc.verification import verify
+
         verdict = verify(solution) if solution.success else None
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
