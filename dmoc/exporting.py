@@ -198,8 +198,8 @@ def _whole_folder(target: Path) -> Iterator[Path]:
     """A temporary folder beside `target`, which takes its place once the block has ended without an error."""
     work = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     old = work.with_name(f"{work.name}.old")
-    work.mkdir()
     try:
+        work.mkdir()
         yield work
         if target.exists():
             os.replace(target, old)
@@ -210,6 +210,8 @@ def _whole_folder(target: Path) -> Iterator[Path]:
                 os.replace(old, target)
             raise
         shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise OSError(f"cannot export to {target}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
 

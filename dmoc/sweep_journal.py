@@ -121,9 +121,13 @@ class Journal:
         """Append one line, and where it begins."""
         place = os.lseek(self._file, 0, os.SEEK_END)
         line = json.dumps(entry, allow_nan=False).encode() + b"\n"
-        while line:
-            line = line[os.write(self._file, line) :]
-        os.fsync(self._file)
+        try:
+            while line:
+                line = line[os.write(self._file, line) :]
+            os.fsync(self._file)
+        except OSError as error:
+            told = f"cannot write {self.path}: {error.strerror}; make room and give the same command again"
+            raise OSError(told) from error
         return place
 
 

@@ -1,10 +1,12 @@
 """What is exported works without dmoc, says what it is, and gives what dmoc gives."""
 
+import errno
 import hashlib
 import json
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -241,6 +243,16 @@ def test_the_manifest_has_the_checksum_of_every_other_file(case):
     assert there == {"manifest.json", *sums}
     for name, digest in sums.items():
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
+
+
+def test_an_export_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match=f"^cannot export to {tmp_path / 'planner'}: No space left on device$"):
+        export(TransferProblem(1, State((0,), (0,)), State((1,), (0,)), 1), tmp_path / "planner", steps=4)
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_earlier_export_is_replaced_and_nothing_else(tmp_path):

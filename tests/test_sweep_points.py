@@ -1,5 +1,6 @@
 """A sweep knows its points, which of them deserve a second look, and what it has already done."""
 
+import errno
 import json
 import os
 
@@ -133,6 +134,15 @@ def test_following_starts_from_the_point_before_in_runs_of_eight(tmp_path):
     assert all(start == str(point - 1) for point, start in first.items() if start is not None)
     # where two runs meet, each is held against the other
     assert {point for point, _ in tasks[20:]} == {7, 8, 17, 18}
+
+
+def test_a_journal_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(OSError, match=r"^cannot write .*out\.nc\.journal: No space left on device; make room"):
+        Journal(tmp_path / "out.nc", {})
 
 
 def test_the_journal_keeps_every_whole_line_and_forgets_a_torn_one(tmp_path):
