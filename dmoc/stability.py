@@ -45,7 +45,9 @@ def growth_along(
     h, fastest = path.duration * np.diff(path.mesh), _rate_bound(flow)
     reach = h * np.maximum(fastest[:-1], fastest[1:])
     # below a tenth no scheme is unstable, and a mesh of many steps is there almost everywhere
-    looked_at = np.union1d(np.flatnonzero(reach > NEGLIGIBLE), np.argsort(reach)[-LOOKED_AT:])
+    chosen = reach > NEGLIGIBLE
+    chosen[np.argsort(reach)[-LOOKED_AT:]] = True
+    looked_at = np.flatnonzero(chosen)
     rates = np.linalg.eigvals([flow[looked_at], flow[looked_at + 1]])
     exact = np.exp(h[looked_at] * rates.real.max(axis=(0, 2)))
     ours = np.abs(np.linalg.eigvals(matrices[looked_at])).max(axis=1)
