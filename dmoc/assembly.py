@@ -19,6 +19,8 @@ from dmoc.compiled import compiled
 
 # How many entries that belong to one place are picked one by one; more are added up as a whole.
 MOST_PICKED = 8
+# Numbers that are the same for so long are written as one.
+LEAST_RUN = 100
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,12 @@ class Kernel:
     Attributes
     ----------
     functions : dict of Function
-        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian".
+        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian", of z
+        and those d and p that are needed; "hessian" also of multipliers and weight.
+    used : lists of int
+        Which d and which p these are.
+    linear : bool
+        Whether the rows are linear in z.
     jacobian, hessian : Sparsity
         Of the rows, and of the upper triangle of weight cost + multipliers . rows.
     costly : bool
@@ -39,6 +46,8 @@ class Kernel:
 
     name: str
     functions: dict[str, ca.Function]
+    used: tuple[list[int], list[int]]
+    linear: bool
     jacobian: ca.Sparsity
     hessian: ca.Sparsity
     costly: bool
@@ -63,23 +72,29 @@ def kernel(name: str, variables: ca.SX, data: ca.SX, parameters: ca.SX, rows: ca
     multipliers, weight = ca.SX.sym("lam", rows.numel()), ca.SX.sym("sigma")
     hessian, slope = ca.hessian(weight * cost + ca.dot(multipliers, rows), variables)
     jacobian, hessian = ca.jacobian(rows, variables), ca.triu(hessian)
-    arguments = [variables, data, parameters]
-    dual = [*arguments, multipliers, weight]
     outputs = {
-        "rows": (arguments, ca.densify(rows)),
-        "cost": (arguments, ca.densify(cost)),
-        "gradient": (arguments, ca.densify(ca.gradient(cost, variables))),
-        "jacobian": (arguments, _nonzeros(jacobian)),
-        "hessian": (dual, _nonzeros(hessian)),
+        "rows": ca.densify(rows),
+        "cost": ca.densify(cost),
+        "gradient": ca.densify(ca.gradient(cost, variables)),
+        "jacobian": _nonzeros(jacobian),
+        "hessian": _nonzeros(hessian),
     }
-    return Kernel(
-        name,
-        {kind: ca.Function(f"{name}_{kind}", given, [out]) for kind, (given, out) in outputs.items()},
-        jacobian.sparsity(),
-        hessian.sparsity(),
-        not cost.is_zero(),
-        ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)]),
-    )
+    used = _used(data, rows, cost), _used(parameters, rows, cost)
+    arguments = [variables, data[used[0]], parameters[used[1]]]
+    dual = [*arguments, multipliers, weight]
+    functions = {
+        kind: ca.Function(f"{name}_{kind}", dual if kind == "hessian" else arguments, [result])
+        for kind, result in outputs.items()
+    }
+    slope = ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)])
+    linear, costly = not _used(variables, jacobian), not cost.is_zero()
+    return Kernel(name, functions, used, linear, jacobian.sparsity(), hessian.sparsity(), costly, slope)
+
+
+def _used(symbols: ca.SX, *results: ca.SX) -> list[int]:
+    """Which of some symbols are in the results."""
+    found = {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*results))}
+    return [i for i, symbol in enumerate(symbols.elements()) if symbol.element_hash() in found]
 
 
 @dataclass(frozen=True)
@@ -139,13 +154,17 @@ def assemble(
     objective `cost_scale` times the sum of the costs. With `compiled` the kernels are machine code.
     """
     columns, rows = len(column_scale), len(row_scale)
-    x, p = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
+    x, parameters = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    unknowns, multipliers, weight = x * column_scale, lam_g * row_scale, cost_scale * lam_f
+    scaled, multipliers = x * _constant(column_scale), lam_g * _constant(row_scale)
     pieces: dict[str, list] = {kind: [] for kind in ("rows", "cost", "gradient", "jacobian", "hessian")}
     for block in blocks:
-        given = [_columns(unknowns, block.columns), ca.DM(block.values), ca.repmat(p, 1, block.count)]
-        local = [_columns(multipliers, block.targets), ca.repmat(weight, 1, block.count)]
+        d, p = block.kernel.used
+        values, numbers = block.values[d], parameters[p]
+        given = [_columns(scaled, block.columns), ca.DM(values), ca.repmat(numbers, 1, block.count)]
+        dual = [_columns(multipliers, block.targets), ca.repmat(cost_scale * lam_f, 1, block.count)]
+        # the slopes of linear rows over equal steps
+        alike = block.kernel.linear and (values == values[:, :1]).all()
         places = {
             "rows": block.targets,
             "cost": np.zeros((1, block.count), int),
@@ -158,7 +177,11 @@ def assemble(
             # an output that is empty or structurally zero is not worth a map
             if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and not block.kernel.costly):
                 continue
-            found = function.map(block.count)(*given, *(local if kind == "hessian" else ()))
+            if kind == "jacobian" and alike:
+                one = function(given[0][:, 0], values[:, 0], numbers)
+                found = ca.repmat(one, 1, block.count)
+            else:
+                found = function.map(block.count)(*given, *(dual if kind == "hessian" else ()))
             pieces[kind].append((found, places[kind]))
 
     f = cost_scale * sum((ca.sum2(piece) for piece, _ in pieces["cost"]), ca.MX(0))
@@ -166,22 +189,33 @@ def assemble(
     slopes = _summed(pieces["gradient"], cost_scale * column_scale)
     jacobian = _matrix(pieces["jacobian"], row_scale, column_scale)
     hessian = _matrix(pieces["hessian"], column_scale, column_scale)
+    given = [x, parameters]
     return Assembly(
         x,
-        p,
+        parameters,
         f,
         g,
-        ca.Function("objective", [x, p], [f]),
-        ca.Function("constraints", [x, p], [g]),
+        ca.Function("objective", given, [f]),
+        ca.Function("constraints", given, [g]),
         # the hooks also have f or g as an output, which Ipopt never asks for; a constant costs nothing
-        ca.Function("nlp_grad_f", [x, p], [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
-        ca.Function("nlp_jac_g", [x, p], [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]),
+        ca.Function("nlp_grad_f", given, [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
+        ca.Function("nlp_jac_g", given, [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
+        ca.Function("nlp_hess_l", [*given, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]),
     )
 
 
 def _nonzeros(matrix: ca.SX) -> ca.SX:
     return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
+
+
+def _constant(values: np.ndarray) -> ca.MX:
+    """Numbers as a vector, put together from few pieces where there are long runs of the same."""
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan))
+    if len(starts) > len(values) / LEAST_RUN:
+        return ca.MX(ca.DM(values))
+    lengths = np.diff(starts, append=len(values)).tolist()
+    runs = zip(lengths, values[starts].tolist(), strict=True)
+    return ca.vertcat(*[ca.MX(ca.Sparsity.dense(length, 1), value) for length, value in runs])
 
 
 def _columns(vector: ca.MX, places: np.ndarray) -> ca.MX:
@@ -208,10 +242,11 @@ def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], scale: np.ndarray) -> ca
         return ca.MX(ca.DM.zeros(len(scale)))
     places = np.concatenate([place.ravel(order="F") for _, place in pieces])
     counts = np.bincount(places, minlength=len(scale))
-    return _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts) * scale
+    picked = _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts)
+    return picked * _constant(scale)
 
 
-def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], row_scale: np.ndarray, column_scale: np.ndarray) -> ca.MX:
+def _matrix(pieces: Sequence[tuple], row_scale: np.ndarray, column_scale: np.ndarray) -> ca.MX:
     """The same for the nonzeros of a matrix, whose places are column * rows + row, with both their scales."""
     rows, columns = len(row_scale), len(column_scale)
     if not pieces:
@@ -224,7 +259,7 @@ def _matrix(pieces: Sequence[tuple[ca.MX, np.ndarray]], row_scale: np.ndarray, c
     begins = np.searchsorted(column, np.arange(columns + 1))
     pattern = ca.Sparsity(rows, columns, begins.tolist(), row.tolist())
     picked = _picked(pieces, order, starts, np.diff(starts, append=len(keys)))
-    return ca.MX(pattern, picked * (row_scale[row] * column_scale[column]))
+    return ca.MX(pattern, picked * _constant(row_scale[row] * column_scale[column]))
 
 
 def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> ca.MX:
@@ -234,12 +269,12 @@ def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, coun
     """
     # one entry more, which is zero, stands where there is nothing to add
     values, nothing = ca.vertcat(*[ca.vec(piece) for piece, _ in pieces], 0), len(order)
-    total = ca.MX(0)
-    for turn in range(min(counts.max(), MOST_PICKED)):
-        some = counts > turn
-        picked = np.full(len(counts), nothing)
-        picked[some] = order[starts[some] + turn]
-        total = total + values[picked.tolist()]
+    picked = np.full(len(counts), nothing)
+    picked[counts > 0] = order[starts[counts > 0]]
+    total = values[picked.tolist()]
+    for turn in range(1, min(counts.max(), MOST_PICKED)):
+        some = np.flatnonzero(counts > turn)
+        total[some.tolist()] += values[order[starts[some] + turn].tolist()]
     # an unknown that is in every step, as a free duration is
     for place in np.flatnonzero(counts > MOST_PICKED):
         begin, end = starts[place] + MOST_PICKED, starts[place] + counts[place]

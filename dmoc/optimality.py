@@ -105,8 +105,9 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
     unknowns, multipliers = x * nlp.columns.scales(), lam_g * nlp.rows.scales() * nlp.units.cost
     slope, rows, cost = np.zeros(len(x)), np.zeros(len(lam_g)), 0.0
     for block in blocks:
-        duals = multipliers[block.targets], 1.0
-        values = block.kernel.slope(unknowns[block.columns], block.values, p, *duals)
+        known, constant = block.kernel.used
+        given = unknowns[block.columns], block.values[known], p[constant], multipliers[block.targets], 1.0
+        values = block.kernel.slope(*given)
         np.add.at(slope, block.columns, values[0].full())
         np.add.at(rows, block.targets, values[1].full())
         cost += float(values[2].full().sum())
