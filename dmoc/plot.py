@@ -196,7 +196,8 @@ def _headline(solution: Solution) -> str:
     words = f"{name}{kind} {solution.objective:.6g} {about.objective_unit.replace('^2', SQUARED)}"
     if not problem or not isinstance(problem.objective, Time):
         words += f", duration {solution.duration:.6g} s"
-    return words + (f", final mass {solution.final_mass:.6g} kg" if np.ptp(solution.path.mass) > 0 else "")
+    told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
+    return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"
 
 
 def _wanted(objective: Objective) -> str:

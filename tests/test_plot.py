@@ -14,6 +14,7 @@ from dmoc import (
     BoxForce,
     Conservative,
     Engine,
+    FinalMass,
     Fuel,
     KeepIn,
     KeepOut,
@@ -301,6 +302,10 @@ def test_where_mass_burns_away_energy_per_mass_is_the_work(hold):
     assert curves["sum of work"] == pytest.approx(curves["energy gained"], abs=1e-3)
     assert curves["work of the effects"][-1] < 0 < curves["work of the force"][-1]
     assert "final mass" in figure(solution).get_suptitle()
+    kept = solve(
+        dataclasses.replace(scene, objective=FinalMass()), order=2, steps=200, hold=hold
+    ).raise_for_status()
+    assert figure(kept).get_suptitle().count("final mass") == 1
 
 
 def test_a_loaded_engine_without_its_problem_shows_momentum(tmp_path):
