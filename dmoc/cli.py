@@ -34,6 +34,7 @@ from dmoc.cli_parts import (
     problem_of,
     show_answer,
     switch,
+    watched,
     writable,
 )
 
@@ -109,7 +110,6 @@ def solve(
 ) -> None:
     """Solve a problem, check the answer, show both."""
     import dmoc
-    from dmoc import report
 
     writable(out)
     writable(plot, drawn=True)
@@ -120,7 +120,7 @@ def solve(
         unit = case.objective.unit_with(case.actuator)
         if starts > 1:
             start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
-        with report.live_line(not (as_json or quiet), unit) as progress:
+        with watched(as_json or quiet, unit) as progress:
             numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold, "compiled": compiled}
             solution = dmoc.solve(case, guess=start, progress=progress, **numerics)
         from dmoc.verification import verify

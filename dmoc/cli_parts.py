@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -90,6 +90,15 @@ def best_start(case: Any, starts: int, order: int | None, hold: bool, guess: Any
     return found[0].path if found else guess
 
 
+def watched(quiet: bool, unit: str) -> AbstractContextManager[Callable | None]:
+    """What a solve is to tell of its progress, with the line of the terminal that shows it."""
+    if quiet:
+        return nullcontext()
+    from dmoc.report import live_line
+
+    return live_line(unit)
+
+
 def attached(path: Path, source: str | None) -> Solution:
     """A saved solution with its problem: the one given, else the one it names.
 
@@ -137,15 +146,17 @@ def show_answer(
     stopped: int = INTERRUPTED,
 ) -> None:
     """Print the answer and exit with the code that says what it is worth."""
-    from dmoc import report
-
-    console = report.console()
     if as_json:
-        print(report.as_json(report.result(solution, verdict)))
-    elif solution.success and verdict is not None:
-        console.print(report.answer(solution, verdict, quiet, written))
+        from dmoc import report_json
+
+        print(report_json.as_text(report_json.result(solution, verdict)))
     else:
-        console.print(report.failure(solution, quiet, written))
+        from dmoc import report
+
+        if solution.success and verdict is not None:
+            report.console().print(report.answer(solution, verdict, quiet, written))
+        else:
+            report.console().print(report.failure(solution, quiet, written))
     if not solution.success:
         raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
     raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)

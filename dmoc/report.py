@@ -1,8 +1,7 @@
-"""What a person sees: a scene in words, the ladder of meshes, the table of checks; and one JSON object."""
+"""What a person sees: a scene in words, the ladder of meshes, the table of checks."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group, RenderableType
-from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
@@ -202,47 +200,15 @@ def figures(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def result(solution: Solution, report: Report | None) -> dict[str, Any]:
-    """The JSON object of a solve; numbers that are not finite become null."""
-    listed = report.checks if report else ()
-    return {
-        "problem": solution.require_problem().name,
-        "success": bool(solution.success),
-        "status": solution.status,
-        "objective": _finite(solution.objective),
-        "duration": _finite(solution.duration),
-        "final_mass": _finite(solution.final_mass),
-        "order": int(solution.order),
-        "steps": int(solution.steps),
-        "nodes": len(solution.position),
-        "iterations": int(solution.iterations),
-        "build_s": _finite(solution.build_s),
-        "solve_s": _finite(solution.solve_s),
-        "verify_s": _finite(report.seconds if report else 0.0),
-        "checks": {
-            check.name: {
-                "value": _finite(check.value),
-                "limit": _finite(check.limit),
-                "unit": check.unit,
-                "ok": bool(check.ok),
-            }
-            for check in listed
-        },
-    }
-
-
-def as_json(value: dict[str, Any]) -> str:
-    """One object, valid JSON even where a number was not finite."""
-    return json.dumps(value, indent=2, allow_nan=False)
-
-
 @contextmanager
-def live_line(wanted: bool, unit: str) -> Iterator[Callable | None]:
-    """A `progress` for `solve` that keeps one line of the terminal up to date, or None."""
+def live_line(unit: str) -> Iterator[Callable | None]:
+    """A `progress` for `solve` that keeps one line of the terminal up to date; None without a terminal."""
     screen = console(stderr=True)
-    if not (wanted and screen.is_terminal):
+    if not screen.is_terminal:
         yield None
         return
+    from rich.live import Live
+
     drawn = -math.inf
     with Live(Text("building"), console=screen, auto_refresh=False, transient=True) as live:
 
@@ -259,10 +225,6 @@ def live_line(wanted: bool, unit: str) -> Iterator[Callable | None]:
             return False
 
         yield progress
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
 
 
 NOT_MET = "The accuracy asked for is not met: this is the best that was found."

@@ -46,7 +46,9 @@ def stability(
 
         save_page(stability_figure(runs, rounding, edges), plot)
     if as_json:
-        print(report.as_json(_object(runs, rounding, edges)))
+        from dmoc.report_json import as_text
+
+        print(as_text(_object(runs, rounding, edges)))
         return
     console = report.console()
     for part in _tables(runs, rounding, edges):

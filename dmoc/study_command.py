@@ -64,7 +64,9 @@ def study(
     if csv is not None:
         report_study.write_csv(trials, csv)
     if as_json:
-        print(report.as_json(report_study.study_object(case.name, trials)))
+        from dmoc.report_json import as_text
+
+        print(as_text(report_study.study_object(case.name, trials)))
         return
     console = report.console()
     unit = case.objective.unit_with(case.actuator)

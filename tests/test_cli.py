@@ -101,7 +101,7 @@ def test_json_stays_pure_when_the_problem_file_prints(run, folder):
 
 
 def test_numbers_that_are_not_finite_become_null():
-    from dmoc.report import as_json, result
+    from dmoc.report_json import as_text, result
     from dmoc.verification import Check, Report
 
     class Diverged:
@@ -114,7 +114,7 @@ def test_numbers_that_are_not_finite_become_null():
             return self.problem
 
     report = Report((Check("residual", float("inf"), float("nan"), "N", False),), 0.3)
-    found = json.loads(as_json(result(Diverged(), report)))
+    found = json.loads(as_text(result(Diverged(), report)))
     assert found["objective"] is None and found["duration"] is None
     assert found["checks"]["residual"] == {"value": None, "limit": None, "unit": "N", "ok": False}
 

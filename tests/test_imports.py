@@ -125,9 +125,11 @@ MAY_IMPORT = {
     "plot_front": "plot_style sweep_data sweep_plan",
     "plot_sweep": "files plot_front plot_style sweep_data",
     "report": "BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library",
-    "cli_parts": "__init__ files library plot report report_tables results solution starts verification",
-    "stability_command": "cli_parts long_run marching plot_stability plot_study report",
-    "study_command": "cli_parts formulation library plot_study report report_study study",
+    "report_json": "solution verification",
+    "cli_parts": "__init__ files library plot report report_json report_tables results solution starts "
+    "verification",
+    "stability_command": "cli_parts long_run marching plot_stability plot_study report report_json",
+    "study_command": "cli_parts formulation library plot_study report report_json report_study study",
     "sweep_command": "cli_parts library report sweeping sweep_data sweep_journal sweep_loop sweep_plan",
     "cli": "__init__ BASICS EFFECTS PARTS NLP MOTION ANSWER VERDICT library plot report influence starts "
     "report_tables plot_sweep sweep_data sweep_command exporting cli_parts doctor stability_command "
@@ -229,6 +231,31 @@ def test_the_front_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
+
+
+@pytest.mark.parametrize(
+    "arguments, unused",
+    [
+        # force-free, coasts, a spiral to an orbit, an orbit that winds, three bodies
+        ("free_flyer", HEAVY),
+        ("two_body_fuel", HEAVY),
+        ("leo_raise --order 4", HEAVY),
+        ("dionysus --json", [*HEAVY, "rich.console"]),
+        ("halo_transfer --json", [*HEAVY, "rich.console"]),
+    ],
+)
+def test_a_solve_loads_what_it_uses(arguments, unused):
+    """SciPy alone takes longer to load than a small problem to solve."""
+    script = (
+        "import atexit, sys\nfrom dmoc.cli import main\n"
+        f"atexit.register(lambda: print(*sorted(set({unused}) & sys.modules.keys()), file=sys.stderr))\n"
+        f"main({['solve', *arguments.split()]})"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.split()) == (0, [])
 
 
 def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
