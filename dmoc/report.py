@@ -122,6 +122,9 @@ def ladder(solution: Solution) -> RenderableType:
         row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
         error = "" if level.error is None else f"{level.error:.1e}"
         table.add_row(*row, level.status, *([error] if estimated else []))
+    # on a narrow terminal headers break, not numbers
+    for column in table.columns:
+        column.min_width = max((len(str(cell)) for cell in column.cells), default=0)
     return table
 
 

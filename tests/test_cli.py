@@ -447,6 +447,13 @@ def test_what_was_stopped_is_not_solved_when_it_is_checked_later(run, tmp_path):
     assert (code, err) == (3, "") and "Not solved: stopped" in out
 
 
+def test_no_number_is_cut_on_a_terminal_of_eighty_columns(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, _ = run("solve", "orbit_raise", "--tol", "1e-6")
+    assert code == 0 and max(map(len, out.splitlines())) <= 80
+    assert re.search(r"0\.0016903\d{3}", out) and "…" not in out
+
+
 def test_an_answer_names_its_objective_in_words_and_once(run):
     code, out, _ = run("solve", "dionysus", "--quiet")
     assert code == 0 and re.match(r"Solved, a local optimum: final mass \S+ kg, duration", out)
