@@ -11,9 +11,9 @@ import numpy as np
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import node_weights, step_nodes
-from dmoc.momenta import end_momenta, legendre_momenta
+from dmoc.momenta import end_momenta, legendre_momenta, step_matrices
 from dmoc.problem import TransferProblem
-from dmoc.simulation import force_of, step_matrices
+from dmoc.simulation import force_of
 from dmoc.solution import Solution
 
 ROUNDING = 10 * np.finfo(float).eps
@@ -96,7 +96,7 @@ class Case:
     @cached_property
     def matrices(self) -> np.ndarray:
         """Derivative of the one-step map along the path, shape (steps, 2 axes, 2 axes) [SI]."""
-        return step_matrices(self.dynamics, self.path, self.begin, self.momentum)
+        return step_matrices(self.dynamics, self.path, self.begin)
 
     # scales
 

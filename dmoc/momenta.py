@@ -32,19 +32,52 @@ def end_momenta(
 
 def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
     """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
-    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
-    at = step_nodes(steps, rule)
-    origin = path.position[0]
+    momenta = legendre_function(dynamics, path.order, path.hold)(*_given(path, start_time))
+    return np.array([np.array(momentum).T.reshape(len(path.mesh) - 1, -1) for momentum in momenta])
+
+
+def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
+
+    By the implicit function theorem from the slopes B of the momenta: p_0 = -P_0, P_1 = .. = P_{s-1} = 0
+    and p_1 = P_s are linear in the changes of all positions of the step. Infinite where they have no solution.
+    """
+    n, s, steps = dynamics.dimension, scheme(path.order).degree, len(path.mesh) - 1
+    make = partial(_legendre_slopes, dynamics, path.order, path.hold)
+    function = kept(make, "legendre slopes", dynamics, path.order, path.hold)
+    slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    inner, start = slopes[:, : n * s, n:], np.zeros((steps, n * s, 2 * n))
+    start[:, :, :n], start[:, :n, n:] = -slopes[:, : n * s, :n], -np.eye(n)
+    try:
+        moves = np.linalg.solve(inner, start)
+    except np.linalg.LinAlgError:  # a step so long that its equations have no one solution
+        return np.full((steps, 2 * n, 2 * n), np.inf)
+    last = slopes[:, n * s :]
+    momenta = last[:, :, n:] @ moves
+    momenta[:, :, :n] += last[:, :, :n]
+    return np.concatenate([moves[:, n * (s - 1) :], momenta], axis=1)
+
+
+def _given(path: Guess, start_time: float) -> tuple:
+    """What the functions of a step are given, the steps of a path side by side."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    at, origin = step_nodes(steps, rule), path.position[0]
 
     def stacked(values: np.ndarray) -> np.ndarray:
         return np.concatenate([values[at[j]].T for j in range(rule.degree + 1)])
 
     control = path.control.T if path.hold else stacked(path.control)
     times = (start_time + path.duration * path.mesh[:-1])[None]
-    function = legendre_function(dynamics, path.order, path.hold)
     lengths = path.duration * np.diff(path.mesh)[None]
-    momenta = function(stacked(path.position - origin), path.mass[at], control, times, lengths, origin)
-    return np.array([np.array(momentum).T.reshape(steps, n) for momentum in momenta])
+    return stacked(path.position - origin), path.mass[at], control, times, lengths, origin
+
+
+def _legendre_slopes(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(q, m, u, t, h, origin) -> derivative of P_0 .. P_s in q."""
+    function = legendre_function(dynamics, order, hold)
+    given = function.sx_in()
+    slopes = ca.jacobian(ca.vertcat(*function.call(given)), given[0])
+    return ca.Function("slopes", given, [ca.densify(slopes)])
 
 
 def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:

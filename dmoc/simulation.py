@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.checks import flag, number, of_kind, short, whole
-from dmoc.kept import kept
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics, step_map
 from dmoc.mesh import Guess, node_fractions, step_nodes, uniform_mesh
@@ -174,29 +172,6 @@ def rollout(
         found = march(states[:, begin], *(piece.reshape(len(piece), -1) for piece in pieces))
         states[:, begin + 1 : begin + count + 1] = found
     return states[:n].T + path.position[0], states[n : 2 * n].T
-
-
-def step_matrices(dynamics: Dynamics, path: Guess, start_time: float, momentum: np.ndarray) -> np.ndarray:
-    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
-
-    `momentum` are the momenta per mass at the step ends, shape (steps+1, axes) [m/s].
-    """
-    n, steps, order, hold = dynamics.dimension, len(path.mesh) - 1, path.order, path.hold
-    tangent = kept(partial(_tangent, dynamics, order, hold), "tangent", dynamics, order, hold)
-    ends = path.position[:: scheme(order).degree] - path.position[0]
-    states = np.concatenate([ends[:-1], momentum[:-1]], axis=1).T
-    matrices = np.array(tangent(states, *_inputs(path, start_time), path.position[0]))
-    return matrices.reshape(2 * n, steps, 2 * n).transpose(1, 0, 2)
-
-
-def _tangent(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
-    """(state, m, u, t, h, origin) -> derivative of the state one step later."""
-    step, n = step_map(dynamics, scheme(order), hold), dynamics.dimension
-    given, state = step.mx_in()[2:], ca.MX.sym("state", 2 * n)
-    increments = ca.vertcat(*step(state[:n], state[n:], *given)[:2])
-    change = ca.DM.eye(2 * n) + ca.jacobian(increments, state)
-    tangent = ca.Function("tangent", [state, *given], [ca.densify(change)])
-    return tangent.expand() if step.is_a("SXFunction") else tangent
 
 
 def _advance(

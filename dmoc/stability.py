@@ -9,7 +9,7 @@ import numpy as np
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
 from dmoc.mesh import Guess
-from dmoc.simulation import step_matrices
+from dmoc.momenta import step_matrices
 
 # Frozen along a path the two differ by what the path changes within a step; where the linearisation is
 # constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.
@@ -99,7 +99,7 @@ def refuse_unstable(dynamics: Dynamics, guess: Guess, start_time: float, shortes
     flow, constant = flow_matrices(dynamics, probe, start_time, velocity)
     if not constant or longest * shortest * _rate_bound(flow).max() < HARMLESS:
         return
-    matrices = step_matrices(dynamics, probe, start_time, velocity)
+    matrices = step_matrices(dynamics, probe, start_time)
     growth = growth_along(dynamics, probe, start_time, velocity, matrices)
     if not growth.ok:
         steps = len(guess.mesh) - 1

@@ -168,12 +168,12 @@ def near_l1(duration):
 
 
 def test_two_unstable_revolutions_are_judged_by_what_they_amplify():
-    found = solve(near_l1(6.0), order=8, steps=100)
+    found = solve(near_l1(6.4), order=8, steps=100)
     report = verify(found)
     assert found.success and report.ok
     # unscaled, the limit would be 1e-8 of the path
     assert 1e-8 < report["rollout"].value < report["rollout"].limit
-    assert "amplifies errors 5." in report["rollout"].note and "e+07" in report["rollout"].note
+    assert "amplifies errors 1.8e+08 times" in report["rollout"].note
     # no march of the forces can confirm an arc that amplifies rounding to the size of the path
     assert not verify(solve(near_l1(12.0), order=8, steps=300))["rollout"].ok
 

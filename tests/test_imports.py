@@ -65,7 +65,7 @@ MAY_IMPORT = {
     "reference": "kept lobatto mechanics mesh",
     "momenta": "kept lobatto mechanics mesh",
     "simulation": "checks kept lobatto mechanics mesh problem",
-    "stability": "lobatto mechanics mesh simulation",
+    "stability": "lobatto mechanics mesh momenta",
     # the way from a problem to a solution
     "spiral": "adams kept splines",
     "coasting": "EFFECTS adams boundary kept mechanics problem spiral",
