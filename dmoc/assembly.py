@@ -268,7 +268,7 @@ def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, coun
     Entries are picked, not multiplied by a matrix of ones: that takes a tenth of the time to build.
     """
     # one entry more, which is zero, stands where there is nothing to add
-    values, nothing = ca.vertcat(*[ca.vec(piece) for piece, _ in pieces], 0), len(order)
+    values, nothing = ca.veccat(*[piece for piece, _ in pieces], 0), len(order)
     picked = np.full(len(counts), nothing)
     picked[counts > 0] = order[starts[counts > 0]]
     total = values[picked.tolist()]

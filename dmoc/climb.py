@@ -146,11 +146,12 @@ class Climb:
             self.answer = replace(self.answer, status="stopped")
             return False
         begun = time.perf_counter()
+        carried = bool(self.levels) and not np.array_equal(guess.mesh, self.nlp.mesh)
         self.nlp = transcribe_onto(problem, guess, units_of(problem, guess), self.compiled)
         if not self.levels:
             refuse_undefined_rows(self.nlp, problem, guess)
         watch = Watch(self.nlp, self.progress, self.interrupt)
-        solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch)
+        solver = make_solver(self.nlp, self.options, bool(guess.multipliers), watch, carried)
         built = time.perf_counter() - begun
         answer = self.answer = run(solver, self.nlp, problem, guess)
         if watch.error is not None:

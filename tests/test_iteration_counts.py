@@ -5,6 +5,7 @@ Times depend on the computer; these counts do not. To record anew, after a chang
     ./scripts/run python tests/test_iteration_counts.py
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import pytest
@@ -17,20 +18,20 @@ from dmoc.mesh import uniform_mesh
 
 # Each problem at its defaults, (order, steps): iterations and evaluations on all meshes.
 RECORD = {
-    "bang_bang": {(2, 400): (17, 114), (8, 32): (13, 84)},
-    "drone_hop": {(2, 400): (43, 430), (8, 32): (29, 340)},
-    "earth_mars": {(2, 400): (70, 444), (8, 32): (87, 566)},
-    "formation": {(2, 400): (48, 304), (8, 32): (28, 174)},
-    "free_flyer": {(2, 400): (97, 660), (8, 32): (64, 394)},
-    "goddard": {(2, 400): (73, 450), (8, 32): (73, 448)},
-    "halo_transfer": {(2, 400): (176, 1112), (8, 32): (148, 940)},
-    "hovercraft": {(2, 400): (89, 606), (8, 32): (95, 612)},
-    "leo_raise": {(2, 400): (121, 782), (8, 32): (109, 688)},
-    "lunar_landing": {(2, 400): (22, 150), (8, 32): (88, 574)},
+    "bang_bang": {(2, 400): (18, 120), (8, 32): (13, 84)},
+    "drone_hop": {(2, 400): (35, 382), (8, 32): (29, 340)},
+    "earth_mars": {(2, 400): (78, 492), (8, 32): (79, 506)},
+    "formation": {(2, 400): (45, 282), (8, 32): (28, 174)},
+    "free_flyer": {(2, 400): (98, 652), (8, 32): (64, 394)},
+    "goddard": {(2, 400): (68, 420), (8, 32): (73, 448)},
+    "halo_transfer": {(2, 400): (180, 1136), (8, 32): (148, 940)},
+    "hovercraft": {(2, 400): (88, 602), (8, 32): (90, 582)},
+    "leo_raise": {(2, 400): (124, 778), (8, 32): (110, 700)},
+    "lunar_landing": {(2, 400): (25, 168), (8, 32): (88, 574)},
     "orbit_raise": {(2, 400): (5, 36), (8, 32): (6, 42)},
     "point_to_point": {(2, 400): (1, 12), (8, 32): (1, 12)},
     "rendezvous": {(2, 400): (1, 12), (8, 32): (1, 12)},
-    "two_body_fuel": {(2, 400): (152, 984), (8, 32): (111, 718)},
+    "two_body_fuel": {(2, 400): (156, 1010), (8, 32): (104, 676)},
 }
 MESHES = ((2, 400), (8, 32))
 GROWTH = 1.2
@@ -39,13 +40,8 @@ LEFT_OUT = {
     "dionysus": "five revolutions: neither mesh is fine enough",
     "geo_raise": "twenty revolutions: neither mesh is fine enough",
 }
-# Where a warm start may take more iterations on the last mesh than a cold one, and why.
-SLOWER_WARM = {
-    ("leo_raise", 2, 400): "least fuel: 46 iterations warm; cold 35 to 140, or none in 1,000, by rounding. "
-    "Throttles interpolated across a switch break the dynamics, and the first ten steps are cut short by "
-    "limits 1e-8 away; a push of 1e-4 off the limits takes fewer here, but 5,424 instead of 4,874 over 32 "
-    "variants of least fuel",
-}
+# Least fuel: rounding changes these counts by half, and some cold starts fail. Sums over some masses tell more.
+JUMPY, MASSES, MOST = ("halo_transfer", "leo_raise", "two_body_fuel"), (1.0, 1.001, 1.002), 300
 CASES = [(name, *at) for name, counts in RECORD.items() for at in counts]
 
 
@@ -81,21 +77,18 @@ def test_counts_have_not_grown(name, order, steps):
         assert now <= max(GROWTH * before, before + few), f"recorded {recorded}, now {levels}"
 
 
-@pytest.mark.parametrize(
-    "name, order, steps",
-    [
-        pytest.param(*case, marks=pytest.mark.xfail(strict=False, reason=SLOWER_WARM[case]))
-        if case in SLOWER_WARM
-        else case
-        for case in CASES
-    ],
-)
+@pytest.mark.parametrize("name, order, steps", CASES)
 def test_the_last_mesh_takes_no_more_iterations_warm_than_cold(name, order, steps):
     problem = load_problem(name).make()
-    cold = Climb(problem)
-    solved = cold.solve_on(starting_guess(problem, uniform_mesh(steps), order, False))
-    last = warm(name, order, steps).ladder[-1]
-    assert not solved or last.iterations <= cold.levels[-1].iterations
+    counts = []
+    for mass in MASSES if name in JUMPY else (1.0,):
+        case = replace(problem, mass=mass * problem.mass)
+        cold = Climb(case, {"ipopt.max_iter": MOST})
+        cold.solve_on(starting_guess(case, uniform_mesh(steps), order, False))
+        last = solve(case, order=order, steps=steps).raise_for_status().ladder[-1]
+        counts.append((last.iterations, cold.levels[-1].iterations))
+    ours, theirs = map(sum, zip(*counts, strict=True))
+    assert ours <= theirs, f"warm and cold {counts}"
 
 
 if __name__ == "__main__":
