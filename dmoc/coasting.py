@@ -98,7 +98,7 @@ def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
         rate = ca.if_else(ca.sumsqr(q - ca.DM(center)) <= near**2, 0, rate)
     # more steps from one of so many places to the next are for more revolutions than a guess can have
     motion = {"t": fraction, "x": state, "p": given, "ode": rate}
-    return adams(motion, np.linspace(0.0, 1.0, samples), tol=1e-9, most_steps=1000)
+    return adams(motion, np.linspace(0.0, 1.0, samples), tol=1e-10, most_steps=1000)
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
