@@ -79,14 +79,14 @@ class Climb:
         On the coarsest the guess is made anew from what it was made from, `given`: brought there from
         a finer mesh its controls would no longer fit its path.
         """
-        refuse_undefined_motion(self.dynamics, self.problem, first)
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
-        if first.multipliers:
-            return self.solve_on(first) or self._explained(first, None)
         stages = _stages(self._meshes(first), self.problem.actuator.smoothing)
         known, solved = first, False
-        if len(stages[0][0]) != len(first.mesh):
+        if len(stages[0][0]) != len(first.mesh) and not first.multipliers:
             known = starting_guess(self.problem, stages[0][0], first.order, first.hold, given)
+        refuse_undefined_motion(self.dynamics, self.problem, known)
+        if first.multipliers:
+            return self.solve_on(first) or self._explained(first, None)
         for mesh, rounding in stages:
             start = known.onto(mesh, first.order, first.hold)
             solved = self.solve_on(start, rounding)

@@ -22,6 +22,8 @@ from dmoc.problem import TransferProblem
 CENTRAL, PUSH = 0.05, 0.3
 # Steps follow the motion where its rate around attractors varies more than this along the guess.
 UNEVEN, SAMPLES = 5.0, 1000
+# A guess is made at so many nodes, where these are as many a revolution, and interpolated on finer meshes.
+GUESSED, NODES_A_TURN = 2000, 100
 
 
 def starting_guess(
@@ -63,6 +65,16 @@ def starting_guess(
     mass = np.full(len(fractions), problem.mass)
     guess = Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
+
+
+def guess_on(problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None) -> Guess:
+    """A starting guess; on a mesh of many steps by way of fewer, where these follow its revolutions as well."""
+    fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
+    if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
+        found = starting_guess(problem, fewer, order, hold)
+        if angle_around(problem, found) < 2 * np.pi * GUESSED / NODES_A_TURN:
+            return found.onto(mesh, order, hold)
+    return starting_guess(problem, mesh, order, hold, given)
 
 
 def angle_around(problem: TransferProblem, guess: Guess) -> float:

@@ -65,7 +65,6 @@ def forget(files: bool = False) -> None:
     """Start as a new process does, for one that measures; without `files` as the first one of all."""
     global _use_files
     _known.clear()
-    _new.clear()
     _use_files = files
 
 

@@ -25,6 +25,8 @@ def end_momenta(
     if momenta is None:
         momenta = legendre_momenta(dynamics, path, start_time)
     p = np.concatenate([-momenta[0], momenta[-1][-1:]])
+    if not dynamics.depends_on_velocity:
+        return p, p.copy()
     times = start_time + path.duration * path.mesh
     v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
     return p, np.array(v).T.reshape(-1, n)

@@ -9,7 +9,7 @@ import numpy as np
 from dmoc.checks import flag, number, of_kind, short, whole
 from dmoc.climb import Climb
 from dmoc.coasting import MANY_TURNS
-from dmoc.guess import angle_around, graded_guess, is_uneven, starting_guess
+from dmoc.guess import angle_around, graded_guess, guess_on, is_uneven, starting_guess
 from dmoc.ipopt import Progress, scaled_multipliers
 from dmoc.lobatto import scheme
 from dmoc.mesh import Guess
@@ -107,7 +107,7 @@ def first_guess(
 ) -> Guess:
     """The guess on the last mesh; what is not given of order and steps is as the motion needs it."""
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
-    first = starting_guess(problem, ends, order or 2, hold, guess)
+    first = guess_on(problem, ends, order or 2, hold, guess)
     if mesh is not None:
         return first
     turns = angle_around(problem, first) / (2 * np.pi)

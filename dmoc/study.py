@@ -16,7 +16,7 @@ from dmoc.checks import number
 from dmoc.climb import Climb
 from dmoc.formulation import Formulation as Formulation
 from dmoc.formulation import Method, Run, counted, solve_other
-from dmoc.guess import starting_guess
+from dmoc.guess import guess_on, starting_guess
 from dmoc.kept import forget
 from dmoc.lobatto import scheme
 from dmoc.mechanics import Dynamics
@@ -95,6 +95,7 @@ def work_precision(
     cold: bool = False,
     compiled: bool = False,
     progress: Callable[[str], None] | None = None,
+    before: Callable[[], None] = forget,
 ) -> list[Trial]:
     """Solve a problem at several orders on several meshes, and measure error and time.
 
@@ -121,6 +122,9 @@ def work_precision(
         Also solve each with functions as machine code, see `solve`.
     progress : callable
         Called before every solve with what it is.
+    before : callable
+        Called before every solve, not timed. By default dmoc forgets the functions it has written down:
+        each solve is timed as the first one ever of its scene.
 
     Returns
     -------
@@ -151,7 +155,7 @@ def work_precision(
         for count in counts
     ]
     value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
-    rounds = [[_told(progress, labels, run) for labels, run in runs] for _ in range(repeats)]
+    rounds = [[_told(progress, labels, before, run) for labels, run in runs] for _ in range(repeats)]
     scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     return [
         _trial(problem, labels, timed, (value, doubt), scales)
@@ -159,11 +163,10 @@ def work_precision(
     ]
 
 
-def _told(progress: Callable[[str], None] | None, labels: tuple, run: Callable[[], Run]) -> Run:
+def _told(progress: Callable[[str], None] | None, labels: tuple, before: Callable, run: Callable) -> Run:
     if progress is not None:
         progress(f"{labels[0]}, {labels[2]} steps")
-    # every method builds its functions anew, as in a process of its own
-    forget()
+    before()
     return run()
 
 
@@ -243,7 +246,7 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compile
     def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
         begun = time.perf_counter()
         climb = Climb(problem, options, compiled=compiled)
-        first = starting_guess(problem, uniform_mesh(steps), order, False)
+        first = guess_on(problem, uniform_mesh(steps), order, False)
         climb.up_to(first) if climbs else climb.solve_on(first)
         return climb.solution(), time.perf_counter() - begun
 

@@ -19,9 +19,11 @@ NAMES = ["orbit_raise", "leo_raise", "drone_hop", "hovercraft", "formation"]
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path, monkeypatch):
     """Files of one test, and no functions kept from another."""
+    store()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     forget(files=True)
     yield tmp_path / "cache" / "dmoc"
+    store()
     forget(files=True)
 
 
