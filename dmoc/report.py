@@ -152,9 +152,8 @@ def answer(
     last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
     if quiet:
         return last
-    meshes = Text("Meshes, coarse to fine", "bold"), ladder(solution), *_accuracy(solution), Text()
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
-    return Group(*meshes, *verdicts, *_files(written), last)
+    return Group(*_meshes(solution), *_accuracy(solution), Text(), *verdicts, *_files(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
@@ -165,9 +164,11 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
     if quiet:
         return Group(head, advice)
     worst = _table("worst rows of the last iterate", "violation")
-    for name, violation, unit in solution.worst:
+    # found by their scaled size, in which different units compare; shown in one's own, largest first
+    units = [unit for _, _, unit in solution.worst]
+    for name, violation, unit in sorted(solution.worst, key=lambda row: (units.index(row[2]), -row[1])):
         worst.add_row(name, f"{violation:.2e} {unit}")
-    return Group(ladder(solution), Text(), worst, Text(), *_files(written), head, advice)
+    return Group(*_meshes(solution), Text(), worst, Text(), *_files(written), head, advice)
 
 
 def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
@@ -231,6 +232,10 @@ def live_line(unit: str) -> Iterator[Callable | None]:
 
 
 NOT_MET = "The accuracy asked for is not met: this is the best that was found."
+
+
+def _meshes(solution: Solution) -> list[RenderableType]:
+    return [Text("Meshes, coarse to fine", "bold"), ladder(solution)]
 
 
 def _accuracy(solution: Solution) -> list[Text]:

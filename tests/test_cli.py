@@ -131,6 +131,13 @@ def test_a_failed_solve_exits_3_names_the_worst_rows_and_what_to_try(run, folder
     assert found["status"] != "solved" and found["duration"] == 2.0 and found["nodes"] == 21
 
 
+def test_the_worst_rows_of_each_unit_are_shown_largest_first(run):
+    code, out, _ = run("solve", "free_flyer", "--steps", 100, "--set", "duration=10")
+    assert code == 3 and out.startswith("Meshes, coarse to fine\norder")
+    sizes = [float(size) for size in re.findall(r"^dynamics\[\d+\]\.[xyz] +(\S+) N *$", out, re.M)]
+    assert len(sizes) > 5 and sizes == sorted(sizes, reverse=True) and sizes[0] > sizes[-1]
+
+
 def test_a_check_that_fails_exits_4(run):
     # twelve steps are too few for one and a half revolutions
     code, out, _ = run("solve", "orbit_raise", "--steps", 12)
