@@ -83,7 +83,7 @@ def settings_for(nlp: NLP, warm: bool = False, carried: bool = False) -> dict[st
         # where an optimum of nothing leaves a direction open, ten iterations that gain nothing are enough
         "ipopt.acceptable_iter": 10,
         "ipopt.acceptable_tol": 1e-6,
-        "ipopt.acceptable_constr_viol_tol": 1e-8,
+        "ipopt.acceptable_constr_viol_tol": 1e-10,
         "ipopt.acceptable_obj_change_tol": 1e-10,
         "ipopt.max_iter": 1000,
     }
