@@ -92,7 +92,7 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
         wide = is_wide(solution)
         path, panels = _panels(page, solution.dimension, wide)
         draw_path(path, solution, beside=wide)
-        size, unit = readable(solution.end_times, "s")
+        size, unit = time_axis = readable(solution.end_times, "s")
         for panel, draw in zip(panels, (_draw_force, _draw_speed, draw_ledger), strict=True):
             draw(panel, solution, size)
             _shade_burns(panel, solution, size)
@@ -106,7 +106,7 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
             panel.set_xlabel(f"time [{unit}]")
         if not wide:
             page.align_ylabels(panels)
-        page.suptitle(_headline(solution), fontsize=16, color=DARK if solution.success else WARNING)
+        page.suptitle(_headline(solution, *time_axis), fontsize=16, color=DARK if solution.success else WARNING)
         words, good = _footnote(solution, report)
         page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
     return page
@@ -187,15 +187,17 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     axes.set_title("Speed")
 
 
-def _headline(solution: Solution) -> str:
+def _headline(solution: Solution, late: float, late_unit: str) -> str:
+    """What was found, with times in the unit of the time axis."""
     about, problem = solution.provenance, solution.problem
     name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
     if not solution.success:
         return f"{name}NOT SOLVED ({solution.status}), the last iterate"
     kind = "objective" if problem is None else _wanted(problem.objective)
-    words = f"{name}{kind} {solution.objective:.6g} {about.objective_unit.replace('^2', SQUARED)}"
+    size, unit = (late, late_unit) if about.objective_unit == "s" else (1.0, about.objective_unit)
+    words = f"{name}{kind} {solution.objective / size:.6g} {unit.replace('^2', SQUARED)}"
     if not problem or not isinstance(problem.objective, Time):
-        words += f", duration {solution.duration:.6g} s"
+        words += f", duration {solution.duration / late:.6g} {late_unit}"
     told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
     return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
 LEVELS = 8
+# Cells each way from which contours bear numbers: on fewer these stand on one another.
+LABELLED = 12
 
 
 def save_sweep(data: Dataset, path: str | os.PathLike) -> None:
@@ -137,7 +139,7 @@ def _draw_map(axes: Any, data: Dataset) -> None:
     cells = axes.pcolormesh(_edges(x), _edges(y), values, norm=_norm(values), cmap="viridis")
     if min(values.shape) > 2 and solved.sum() > 8 and np.ptp(values[solved]) > 0:
         lines = axes.contour(x, y, values, levels=_levels(values), colors="white", linewidths=0.9)
-        for text in axes.clabel(lines, fontsize=9, fmt="%.3g"):
+        for text in axes.clabel(lines, fontsize=9, fmt="%.3g") if min(values.shape) >= LABELLED else ():
             text.set_path_effects([withStroke(linewidth=1.5, foreground=DARK)])
     _hatch(axes, x, y, ~solved, "xxx", PALE, "not solved")
     _hatch(axes, x, y, solved & ~held.T, "...", WARNING, "a check fails")

@@ -13,6 +13,7 @@ from dmoc import (
     BallForce,
     BoxForce,
     Conservative,
+    Effort,
     Engine,
     FinalMass,
     Fuel,
@@ -439,3 +440,16 @@ def test_far_walls_and_large_zones_do_not_hide_the_path():
 )
 def test_units_read_well(value, unit, expected):
     assert readable(np.array([0.0, -value]), unit) == expected
+
+
+def test_the_title_has_times_in_the_unit_of_their_axis():
+    week = 7 * 86400.0
+    scene = {"actuator": BoxForce(1.0), "start": State((0,), (0,)), "goal": State((0.25 * week**2,), (0,))}
+    titles = []
+    for objective, duration in ((Effort(), 1.5 * week), (Time(), (0.1 * week, 2 * week))):
+        problem = TransferProblem(1, duration=duration, objective=objective, **scene)
+        page = figure(solve(problem, steps=20).raise_for_status())
+        assert page.axes[-1].get_xlabel() == "time [days]"
+        titles.append(page.get_suptitle())
+    assert titles[0].endswith(", duration 10.5 days")
+    assert titles[1] == "least time 7 days"

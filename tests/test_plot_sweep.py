@@ -61,6 +61,16 @@ def test_two_parameters_are_a_map_with_failures_hatched(tmp_path):
     assert figure(picture(plan_of(4, 4), lambda at: None)).axes
 
 
+@pytest.mark.parametrize(("across", "up"), [(7, 6), (20, 6), (20, 14)])
+def test_contours_bear_numbers_where_these_do_not_overlap(across, up):
+    """Wherever there are numbers, no two of them share ink: on the steepest side of a map."""
+    page = figure(picture(plan_of(across, up), lambda at: 1 + at["p0"] ** 2 + at["p1"] ** 4))
+    page.canvas.draw()
+    boxes = [text.get_window_extent() for text in page.axes[0].texts]
+    assert bool(boxes) == (min(across, up) >= 12)
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
 def test_the_front_is_what_no_other_beats_in_both():
     x, y = np.random.default_rng(0).random((2, 200))
     front = set(pareto(x, y).tolist())
