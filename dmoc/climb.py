@@ -25,6 +25,8 @@ from dmoc.tube import in_tube, out_of_tube
 # Nodes of the coarsest mesh, and how much finer the next ones are: where there are limits, which take many
 # iterations, and where there are none. Without, 400 nodes take no longer than 100 and 400 after them.
 COARSEST_NODES, FINER = {True: 100, False: 400}, {True: 4, False: 16}
+# Without limits all is smooth: one coarse mesh of this order is nearer the answer than finer ones of order 2.
+SMOOTH_ORDER = 6
 MOST_COARSE = 400
 # Steps of order 2 over the number of revolutions to the power 1.5, for a phase that is roughly right.
 IN_PHASE = 50
@@ -80,19 +82,21 @@ class Climb:
         a finer mesh its controls would no longer fit its path.
         """
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
-        stages = _stages(self._meshes(first), self.problem.actuator.smoothing)
+        order, meshes = self._meshes(first)
+        stages = _stages(meshes, self.problem.actuator.smoothing)
         known, solved = first, False
-        if len(stages[0][0]) != len(first.mesh) and not first.multipliers:
-            known = starting_guess(self.problem, stages[0][0], first.order, first.hold, given)
+        if len(meshes) > 1 and not first.multipliers:
+            known = starting_guess(self.problem, meshes[0], order, first.hold, given)
         refuse_undefined_motion(self.dynamics, self.problem, known)
         if first.multipliers:
             return self.solve_on(first) or self._explained(first, None)
         for mesh, rounding in stages:
-            start = known.onto(mesh, first.order, first.hold)
+            this = first.order if mesh is first.mesh else order
+            start = known.onto(mesh, this, first.hold)
             solved = self.solve_on(start, rounding)
             if not solved and self.problem.free_duration and self.answer.status != "stopped":
                 longer = min(self.problem.duration_bounds[1], 10 * first.duration)
-                again = replace(first.onto(mesh, first.order, first.hold), duration=longer)
+                again = replace(first.onto(mesh, this, first.hold), duration=longer)
                 solved = self.solve_on(again, rounding)
             solved = solved or self._explained(start, rounding)
             hopeless = self.cause is not None and HOPELESS < self.cause.excess < np.inf
@@ -171,23 +175,24 @@ class Climb:
         engine: Any = self.problem.actuator
         return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
-    def _meshes(self, first: Guess) -> list[np.ndarray]:
-        """Meshes from coarse to the final one.
+    def _meshes(self, first: Guess) -> tuple[int, list[np.ndarray]]:
+        """The order of the coarse meshes, and all meshes up to the final one.
 
         The coarsest has 100 or 400 nodes, or as many as keep h omega below 1 on the guess: a mesh that
-        cannot follow the motion has optima of its own. Over many revolutions that takes more: its error
-        in the phase adds up.
+        cannot follow the motion has optima of its own. Over many revolutions that takes more at order 2:
+        its error in the phase adds up.
         """
         final, limited = first.mesh, self.problem.limited
-        counts, least = [len(final) - 1], COARSEST_NODES[limited] // (first.order // 2)
+        order = first.order if limited or first.hold else max(first.order, SMOOTH_ORDER)
+        counts, least = [(len(final) - 1) * (first.order // 2)], COARSEST_NODES[limited]
         if counts[0] > 2 * least:
-            turns = angle_around(self.problem, first) / (2 * np.pi) if first.order == 2 else 0.0
-            least = max(least, self.least_steps(first), int(IN_PHASE * turns**1.5))
+            turns = angle_around(self.problem, first) / (2 * np.pi) if order == 2 else 0.0
+            least = max(least, order // 2 * self.least_steps(first), int(IN_PHASE * turns**1.5))
         while counts[-1] > 2 * least:
-            counts.append(max(least, -(-counts[-1] // FINER[limited])))
+            counts.append(max(least, -(-counts[-1] // FINER[limited])) if order == first.order else least)
         places = np.linspace(0.0, 1.0, len(final))
-        coarser = [np.interp(uniform_mesh(count), places, final) for count in reversed(counts[1:])]
-        return [*coarser, final]
+        steps = [count // (order // 2) for count in reversed(counts[1:])]
+        return order, [*(np.interp(uniform_mesh(count), places, final) for count in steps), final]
 
     def least_steps(self, guess: Guess) -> int:
         """Steps that keep h omega below 1 along a guess, omega the fastest rate of the linearised motion.
