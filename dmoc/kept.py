@@ -18,7 +18,8 @@ import pickle
 import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
+from types import FunctionType
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -70,33 +71,44 @@ def forget(files: bool = False) -> None:
 
 @atexit.register
 def store() -> None:
-    """Write what is new to the user's folder."""
+    """Write what is new to the user's folder, unless dmoc's source files are no longer what made it."""
     if not _new:
         return
+    unchanged = VERSION and _version() == VERSION
     while _new:
         name, value = _new.popitem()
-        cache.write(_file(name), pickle.dumps(value))
+        if unchanged:
+            cache.write(_file(name), pickle.dumps(value))
     cache.tidy("*.functions")
 
 
 def _read(name: Hashable) -> Any:
-    content = cache.read(_file(name)) if _use_files else None
-    return None if content is None else pickle.loads(content)
+    content = cache.read(_file(name)) if _use_files and VERSION else None
+    try:
+        return None if content is None else pickle.loads(content)
+    except Exception:  # whatever another build of CasADi raises
+        return None
 
 
 def _file(name: Hashable) -> str:
-    return hashlib.sha256(f"{_version()} {name}".encode()).hexdigest() + ".functions"
+    return hashlib.sha256(f"{VERSION} {name}".encode()).hexdigest() + ".functions"
 
 
-@lru_cache
 def _version() -> str:
-    """Of all that has a say in what is made: another one has other files."""
+    """Of all that has a say in what is made, another one has other files; empty where there are no sources."""
     here = os.path.dirname(__file__)
-    files = [entry for place in (here, os.path.join(here, "effects")) for entry in os.scandir(place)]
-    found = [(file.path, file.stat()) for file in files if file.name.endswith(".py")]
+    try:
+        files = [entry for place in (here, os.path.join(here, "effects")) for entry in os.scandir(place)]
+        found = [(file.path, file.stat()) for file in files if file.name.endswith(".py")]
+    except OSError:  # in an archive
+        found = []
     sources = sorted((path, about.st_size, about.st_mtime_ns) for path, about in found)
     made_of = repr((ca.CasadiMeta.version(), np.__version__, sys.version, sources))
-    return hashlib.sha256(made_of.encode()).hexdigest()
+    return hashlib.sha256(made_of.encode()).hexdigest() if sources else ""
+
+
+# When this is loaded: sources that are edited afterwards are not what runs.
+VERSION = _version()
 
 
 def identity(value: Any) -> Hashable:
@@ -112,7 +124,7 @@ def identity(value: Any) -> Hashable:
     if kind in (tuple, list):
         return tuple(map(identity, value))
     kind = value if isinstance(value, type) else kind
-    if kind.__module__.split(".")[0] != __name__.split(".")[0]:
+    if not _is_own(kind) or _is_patched(kind):
         raise TypeError(kind)
     if isinstance(value, type):
         return value
@@ -120,3 +132,15 @@ def identity(value: Any) -> Hashable:
     if not fields and vars(value):
         raise TypeError(kind)
     return kind, tuple(identity(getattr(value, name)) for name in fields)
+
+
+def _is_own(thing: Any) -> bool:
+    return thing.__module__.split(".")[0] == __name__.split(".")[0]
+
+
+def _is_patched(kind: type) -> bool:
+    """Whether somebody has put a method of their own into one of dmoc's classes."""
+    parts = [part for base in kind.__mro__ if _is_own(base) for part in vars(base).values()]
+    methods = [part for part in parts if isinstance(part, FunctionType) and not _is_own(part)]
+    # those that dataclasses make are not dmoc's either
+    return any(method.__module__ not in sys.stdlib_module_names for method in methods)

@@ -1,5 +1,6 @@
 """Functions kept between processes: the same answer, and nothing but what was written is ever read."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,8 @@ def own_folder(tmp_path, monkeypatch):
     """Files of one test, and no functions kept from another."""
     store()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    # whoever runs these may be editing the sources
+    monkeypatch.setattr(dmoc.kept, "_version", lambda: dmoc.kept.VERSION)
     forget(files=True)
     yield tmp_path / "cache" / "dmoc"
     store()
@@ -82,7 +85,46 @@ def test_a_file_that_is_not_as_it_was_written_is_made_anew(change, own_folder):
 def test_other_sources_have_other_files(monkeypatch):
     assert kept(lambda: "made", "test") == "made"
     next_process()
-    monkeypatch.setattr(dmoc.kept, "_version", lambda: "another")
+    monkeypatch.setattr(dmoc.kept, "VERSION", "another")
+    assert kept(lambda: "made anew", "test") == "made anew"
+
+
+def copied(place, code):
+    """What a process prints that runs a copy of the package."""
+    code = f"import sys; sys.path[:1] = [{str(place)!r}]\n{code}"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (found.returncode, found.stderr) == (0, "")
+    return found.stdout
+
+
+PULL = """
+from dmoc import PointGravity
+from dmoc.mechanics import Dynamics
+{between}
+print(Dynamics(1, (PointGravity(1.0),)).point(0, 1, 0, 1)[0])
+"""
+
+
+def test_sources_edited_while_a_process_runs_have_no_files_from_it(tmp_path):
+    copy = shutil.copytree(Path(dmoc.__file__).parent, tmp_path / "dmoc") / "effects" / "gravity.py"
+    edited = copy.read_text().replace("return self.mu / ", "return 3 * self.mu / ")
+    edit = f"from pathlib import Path; Path({str(copy)!r}).write_text({edited!r})"
+    assert copied(tmp_path, PULL.format(between=edit)) == "-1\n", "the old sources must have been in memory"
+    assert copied(tmp_path, PULL.format(between="")) == "-3\n"
+
+
+def test_a_package_in_an_archive_works_without_files(tmp_path, own_folder):
+    package = Path(dmoc.__file__).parent
+    archive = shutil.make_archive(str(tmp_path / "package"), "zip", package.parent, package.name)
+    assert copied(archive, PULL.format(between="")) == "-1\n"
+    assert not own_folder.exists() or not files(own_folder)
+
+
+def test_what_cannot_be_read_is_made_anew(own_folder):
+    kept(lambda: "made", "test")
+    next_process()
+    (file,) = files(own_folder)
+    cache.write(file.name, b"cno_such_module\nno_such_class\n.")
     assert kept(lambda: "made anew", "test") == "made anew"
 
 

@@ -199,6 +199,15 @@ def test_what_cannot_be_told_apart_by_its_numbers_is_made_anew(value):
     assert kept(object, "test", value) is not kept(object, "test", value)
 
 
+def test_a_class_with_a_method_of_the_user_s_is_made_anew(monkeypatch):
+    identity(PointGravity(1.0))
+    monkeypatch.setattr(PointGravity, "lagrangian", lambda self, t, q, v, m: q[0])
+    with pytest.raises(TypeError):
+        identity(PointGravity(1.0))
+    with pytest.raises(TypeError):
+        identity(PointGravity)
+
+
 @pytest.mark.parametrize(
     "pair", [(1, 1.0), (True, 1), (0.0, -0.0), (1, "1"), (None, 0), ((1,), ((1,),))], ids=str
 )
