@@ -1,5 +1,8 @@
 """Result files: a Solution as netCDF-4, with units, and back again to the last bit.
 
+xarray opens them and has a view of a Solution, but is not needed to write or read one: with pandas,
+which it brings along, it takes longer to load than a solution to be checked.
+
 Dimensions: node, end (of a step), step, axis, channel (one a control). Every multiplier group is a
 variable of its own, `multiplier_<side>_<name>`, whose attribute `key` is its name in
 `Guess.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
@@ -10,6 +13,7 @@ format 1 have none and are read as they are.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import platform
@@ -42,14 +46,27 @@ DUAL_UNITS = {
 }
 
 
+# (dimensions, values, attributes) of every variable by name
+Table = dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]
+
+
 def write(solution: Solution, path: str | os.PathLike) -> None:
     """Write a solution to a netCDF-4 file, whole or not at all; see `Solution.save`."""
-    dataset = to_dataset(solution)
-    plain = {name: {"_FillValue": None} for name in dataset.variables}
+    import h5netcdf
+    import h5py
+
     # in memory, since HDF5 may crash where a disk is full
-    content = dataset.to_netcdf(engine="h5netcdf", encoding=plain)
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        file.attrs.update(_attributes(solution))
+        for name, (dimensions, values, attributes) in _variables(solution).items():
+            for dimension, size in zip(dimensions, values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = size
+            kind = h5py.string_dtype() if values.dtype == object else values.dtype
+            file.create_variable(name, dimensions, kind, data=values).attrs.update(attributes)
     with whole_file(path) as temporary:
-        temporary.write_bytes(sealed(bytes(content)))
+        temporary.write_bytes(sealed(content.getvalue()))
 
 
 def read(path: str | os.PathLike) -> Solution:
@@ -57,12 +74,12 @@ def read(path: str | os.PathLike) -> Solution:
     file = path_of(path)
     _refuse_what_is_no_netcdf(file)
     whole = is_sealed(file)
-    dataset = _open(file)
-    _refuse_other_formats(file, dataset.attrs)
-    if dataset.attrs["format_version"] > 1 and not whole:
+    facts, table = _open(file)
+    _refuse_other_formats(file, facts)
+    if facts["format_version"] > 1 and not whole:
         raise ValueError(f"{file} was cut short or changed: it lacks its checksum; {AGAIN}")
     try:
-        return _check_shapes(from_dataset(dataset))
+        return _check_shapes(_solution(facts, table))
     except KeyError as error:
         raise ValueError(f"{file} is damaged: it lacks the attribute {error}; {AGAIN}") from None
     except (TypeError, ValueError, AttributeError) as error:
@@ -73,6 +90,10 @@ def to_dataset(solution: Solution) -> Any:
     """An `xarray.Dataset` of everything a solution holds except its problem."""
     import xarray
 
+    return xarray.Dataset(_variables(solution), attrs=_attributes(solution))
+
+
+def _variables(solution: Solution) -> Table:
     path, about = solution.path, solution.provenance
     at = "step" if path.hold else "node"
     control_unit = ", ".join(dict.fromkeys(about.control_units))
@@ -89,25 +110,23 @@ def to_dataset(solution: Solution) -> Any:
         "start_velocity": (("axis",), path.start_velocity, "m/s", "velocity at the start"),
         "goal_velocity": (("axis",), path.goal_velocity, "m/s", "velocity at the goal"),
     }
-    variables: dict[str, Any] = {
+    variables: Table = {
         name: (dims, values, {"units": unit, "long_name": words})
         for name, (dims, values, unit, words) in table.items()
     }
-    variables |= _multipliers(solution)
     labels = {"axis": list("xyz"[: solution.dimension]), "channel": list(about.control_labels)}
     coordinates = {name: ((name,), np.array(values, object), {"units": "1"}) for name, values in labels.items()}
-    return xarray.Dataset(variables, coordinates, _attributes(solution))
+    return variables | _multipliers(solution) | coordinates
 
 
-def from_dataset(data: Any) -> Solution:
-    """The solution in a dataset of `to_dataset`."""
-    facts = data.attrs
+def _solution(facts: dict[str, Any], table: Table) -> Solution:
+    """The solution in a file's attributes and variables."""
     return Solution(
         None,
-        _path(data),
-        _array(data, "velocity"),
-        _array(data, "momentum"),
-        _array(data, "force"),
+        _path(facts, table),
+        _array(table, "velocity"),
+        _array(table, "momentum"),
+        _array(table, "force"),
         float(facts["objective"]),
         bool(facts["success"]),
         str(facts["status"]),
@@ -117,35 +136,33 @@ def from_dataset(data: Any) -> Solution:
         tolerance=json.loads(facts["tolerance"]),
         error=Error(**error) if (error := json.loads(facts["error"])) else None,
         reason=str(facts["reason"]),
-        provenance=_provenance(data),
+        provenance=_provenance(facts, table),
     )
 
 
-def _path(data: Any) -> Guess:
-    facts = data.attrs
-    groups = [name for name in data.data_vars if name.startswith("multiplier_")]
+def _path(facts: dict[str, Any], table: Table) -> Guess:
+    groups = [name for name in table if name.startswith("multiplier_")]
     return Guess(
-        _array(data, "mesh"),
+        _array(table, "mesh"),
         int(facts["order"]),
         bool(facts["hold"]),
         float(facts["duration"]),
-        _array(data, "position"),
-        _array(data, "control"),
-        _array(data, "mass"),
-        _array(data, "start_velocity"),
-        _array(data, "goal_velocity"),
-        {str(data[name].attrs["key"]): _array(data, name) for name in groups},
+        _array(table, "position"),
+        _array(table, "control"),
+        _array(table, "mass"),
+        _array(table, "start_velocity"),
+        _array(table, "goal_velocity"),
+        {str(table[name][2]["key"]): _array(table, name) for name in groups},
     )
 
 
-def _provenance(data: Any) -> Provenance:
-    facts = data.attrs
+def _provenance(facts: dict[str, Any], table: Table) -> Provenance:
     return Provenance(
         str(facts["problem"]),
         json.loads(facts["parameters"]),
         float(facts["start_time"]),
         str(facts["objective_unit"]),
-        tuple(str(label) for label in data["channel"].values),
+        tuple(str(label) for label in table["channel"][1]),
         tuple(json.loads(facts["control_units"])),
         json.loads(facts["options"]),
         str(facts["source_hash"]),
@@ -154,10 +171,10 @@ def _provenance(data: Any) -> Provenance:
     )
 
 
-def _array(data: Any, name: str) -> np.ndarray:
-    if name not in data.variables:
+def _array(table: Table, name: str) -> np.ndarray:
+    if name not in table:
         raise ValueError(f"it lacks the variable {name!r}")
-    return np.array(data[name].values, float)
+    return np.array(table[name][1], float)
 
 
 def _attributes(solution: Solution) -> dict[str, Any]:
@@ -215,8 +232,8 @@ def _text(value: Any) -> str:
     return json.dumps(value, default=plain)
 
 
-def _multipliers(solution: Solution) -> dict[str, tuple]:
-    variables: dict[str, tuple] = {}
+def _multipliers(solution: Solution) -> Table:
+    variables: Table = {}
     for key, values in solution.path.multipliers.items():
         _, side, group = key.split(":", 2)
         name = re.sub(r"\W+", "_", f"multiplier_{side}_{group}")
@@ -252,13 +269,14 @@ def _refuse_what_is_no_netcdf(file: Path) -> None:
         raise ValueError(f"{file} is not a result of dmoc: it is no netCDF-4 file; {WRITTEN_BY}")
 
 
-def _open(file: Path) -> Any:
-    import xarray
+def _open(file: Path) -> tuple[dict[str, Any], Table]:
+    """Attributes and variables of a netCDF file, as they were written."""
+    import h5netcdf
 
     try:
-        # nothing is decoded: the numbers come back as they were written
-        with xarray.open_dataset(file, engine="h5netcdf", decode_cf=False, phony_dims="access") as dataset:
-            return dataset.load()
+        with h5netcdf.File(file, "r", phony_dims="access", decode_vlen_strings=True) as data:
+            table = {name: (one.dimensions, one[...], dict(one.attrs)) for name, one in data.variables.items()}
+            return dict(data.attrs), table
     except Exception as error:  # the layers below raise whatever they trip over
         raise ValueError(f"{file} is damaged or cut short ({_one_line(error)}); {AGAIN}") from None
 

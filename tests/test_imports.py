@@ -258,6 +258,18 @@ def test_a_solve_loads_what_it_uses(arguments, unused):
     assert (done.returncode, done.stderr.split()) == (0, [])
 
 
+def test_checking_a_file_loads_no_xarray(tmp_path):
+    """It brings pandas along; together they take as long as all the rest of `dmoc check`."""
+    script = (
+        "import sys\nfrom dmoc.cli import main\n"
+        "try:\n    main(['solve', 'point_to_point', '--out', 'p.nc', '--quiet'])\nexcept SystemExit: pass\n"
+        "try:\n    main(['check', 'p.nc'])\nfinally:\n"
+        "    print(*sorted({'xarray', 'pandas', 'dask'} & sys.modules.keys()), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.split()) == (0, []) and "check" in done.stdout
+
+
 def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
     """Importing a submodule binds its name on the package, over the function of the same name."""
     import dmoc

@@ -6,6 +6,8 @@ import os
 import resource
 from pathlib import Path
 
+import h5netcdf
+import h5py
 import numpy as np
 import pytest
 import xarray
@@ -140,6 +142,15 @@ def test_saving_a_loaded_solution_again_changes_nothing(saved, tmp_path):
         assert one.identical(other)
 
 
+def test_a_file_holds_the_view_that_xarray_has_of_the_solution(case, tmp_path):
+    _, _, solution = case
+    solution.save(tmp_path / "s.nc", created="now")
+    view = to_dataset(load(tmp_path / "s.nc"))
+    with xarray.open_dataset(tmp_path / "s.nc", decode_cf=False) as data:
+        assert data.identical(view) and list(data.variables) == list(view.variables)
+        assert set(data.coords) == {"axis", "channel"}
+
+
 def test_every_variable_has_a_unit_and_the_promised_dimensions(case):
     _, _, solution = case
     data = to_dataset(solution)
@@ -234,7 +245,7 @@ def edited(saved, path, change, checksum=True):
 
 
 def test_a_damaged_file_is_refused_before_anything_opens_it(saved, tmp_path, monkeypatch):
-    monkeypatch.setattr(xarray, "open_dataset", lambda *_, **__: pytest.fail("opened"))
+    monkeypatch.setattr(h5netcdf, "File", lambda *_, **__: pytest.fail("opened"))
     whole, path, random = saved.read_bytes(), tmp_path / "damaged.nc", np.random.default_rng(0)
     # every byte of the checksum itself, then any of all
     places = [[len(whole) - 1 - i] for i in range(77)]
@@ -265,7 +276,6 @@ def test_netcdf_of_someone_else_is_refused(tmp_path):
 
 
 def test_hdf5_of_someone_else_is_refused(tmp_path):
-    h5py = pytest.importorskip("h5py")
     path = tmp_path / "plain.h5"
     with h5py.File(path, "w") as file:
         file["numbers"] = np.ones((2, 3))
