@@ -140,7 +140,12 @@ def _is_own(thing: Any) -> bool:
 
 def _is_patched(kind: type) -> bool:
     """Whether somebody has put a method of their own into one of dmoc's classes."""
-    parts = [part for base in kind.__mro__ if _is_own(base) for part in vars(base).values()]
-    methods = [part for part in parts if isinstance(part, FunctionType) and not _is_own(part)]
+    methods = [
+        part
+        for base in kind.__mro__
+        if _is_own(base)
+        for part in vars(base).values()
+        if type(part) is FunctionType and part.__module__ != base.__module__
+    ]
     # those that dataclasses make are not dmoc's either
-    return any(method.__module__ not in sys.stdlib_module_names for method in methods)
+    return any(not _is_own(part) and part.__module__ not in sys.stdlib_module_names for part in methods)
