@@ -21,6 +21,8 @@ PREFACE = """\
 #endif
 """
 
+LAST_LINES = '} /* extern "C" */\n#endif\n'
+
 HEADER = """\
 /* {name}: {about}
 {documentation}
@@ -79,6 +81,10 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
     for exported in functions:
         generator.add(exported.function)
     generator.generate(f"{folder}{os.sep}")
+    for name in ("functions.c", "functions.h"):
+        # CasADi does not say when the disk is full
+        if not (folder / name).read_text().endswith(LAST_LINES):
+            raise OSError(f"{name} could not be written whole")
     source = folder / "functions.c"
     source.write_text(PREFACE + source.read_text())
     (folder / "transfer.h").write_text(_header(planner.scene, functions))

@@ -3,6 +3,8 @@
 import errno
 import hashlib
 import json
+import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -281,6 +283,47 @@ def test_an_export_that_fails_leaves_all_as_it_was(tmp_path, monkeypatch):
             export(FLYER, tmp_path / name, steps=6)
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
     assert (tmp_path / "old" / "manifest.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("command", [True, False])
+@pytest.mark.parametrize("size", [3000, 30_000, 100_000])
+def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path, monkeypatch, capfd, size, command):
+    """A limit on the size of files stands in for it; `Function.save` would pass over it without a word."""
+    monkeypatch.chdir(tmp_path)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        if command:
+            with pytest.raises(SystemExit) as end:
+                main(["export", "free_flyer", "out", "--steps", "20"])
+            assert end.value.code == 2
+            words = capfd.readouterr().err
+        else:
+            with pytest.raises(OSError) as caught:
+                export(FLYER, "out", steps=20)
+            words = f"{caught.value}\n"
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert re.fullmatch(r"(?:.*: )?cannot export to .*out: File too large\n", words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_code_that_casadi_could_not_write_whole_is_told_of(tmp_path):
+    planner = Planner.of(FLYER, 2, 6, False)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"functions\.c could not be written whole"):
+            write_code(planner, functions_of(planner)[:3], tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_what_is_saved_is_what_casadi_saves(tmp_path):
+    for exported in functions_of(Planner.of(FLYER, 2, 6, False)):
+        exported.function.save(str(tmp_path / "its.casadi"))
+        exporting._save(exported.function, tmp_path / "ours.casadi")
+        assert (tmp_path / "ours.casadi").read_bytes() == (tmp_path / "its.casadi").read_bytes()
 
 
 @pytest.mark.parametrize(
