@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
+from dmoc import cache
 from dmoc.compiled import compiler
 from dmoc.kept import forget
 from dmoc.library import load_problem
@@ -56,12 +57,13 @@ class Timing:
 
 @dataclass(frozen=True)
 class Findings:
-    """What `examine` found; `compiler` is None where there is none."""
+    """What `examine` found; `compiler` and the folder `cache` are None where there is none."""
 
     versions: dict[str, str]
     system: str
     cores: int
     compiler: str | None
+    cache: str | None
     linear_solvers: tuple[Linear, ...]
     timings: tuple[Timing, ...]
 
@@ -77,6 +79,7 @@ def examine(seconds: float = 5.0) -> Findings:
         system=f"{platform.system()} {platform.machine()}",
         cores=usable_cores(),
         compiler=compiler(),
+        cache=cache.folder(),
         linear_solvers=solvers,
         timings=tuple(benchmark(order, steps, share) for order, steps in MESHES) if seconds else (),
     )

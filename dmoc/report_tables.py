@@ -77,7 +77,7 @@ def findings_table(found: Findings) -> RenderableType:
     fails = [solver.name for solver in found.linear_solvers if not solver.works]
     milliseconds = [
         f"order {run.order}, {run.steps} steps: {1e3 * run.build_s:.0f} ms to build, "
-        f"{1e3 * run.solve_s:.0f} ms to solve (medians of {run.runs})"
+        f"{1e3 * run.solve_s:.0f} ms to solve (medians of {run.runs} first solves)"
         for run in found.timings
     ]
     return pairs(
@@ -86,6 +86,7 @@ def findings_table(found: Findings) -> RenderableType:
             ("system", f"{found.system}, {found.cores} cores that may be used"),
             ("linear solvers", [f"{', '.join(works) or 'none'} in Ipopt", f"not here: {', '.join(fails)}"]),
             ("C compiler", found.compiler or "none found; only --compiled and code from dmoc export need one"),
+            ("cache", found.cache or "none: no folder that you alone may write to"),
             ("orbit_raise", milliseconds),
         ]
     )

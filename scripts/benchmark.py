@@ -259,7 +259,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder
         results = measure(given.largest)
-        dmoc.kept.forget()
+        dmoc.kept.store()
     console.print(f"\n{time.perf_counter() - begun:.0f} s")
     if given.json is not None:
         given.json.write_text(json.dumps(results, indent=2))

@@ -94,7 +94,7 @@ MAY_IMPORT = {
     "formulation": "ipopt mesh problem",
     "starts": "BASICS NLP MOTION climb coasting constraints solver",
     "influence": "BASICS EFFECTS PARTS NLP MOTION solution",
-    "doctor": "compiled kept library solver",
+    "doctor": "cache compiled kept library solver",
     "report_tables": "EFFECTS doctor influence report solution starts",
     "study": "BASICS NLP MOTION ANSWER formulation kept",
     "long_run": "BASICS EFFECTS PARTS mechanics problem",
