@@ -143,8 +143,10 @@ class Winding:
         """Whole revolutions beyond the angle between the ends."""
         turns = 10
         for _ in range(ROUNDS):
-            taken = self._time(turns) or self._time(turns + 1)
+            taken, known = self._time(turns) or self._time(turns + 1), turns
             turns = max(round((turns + 1) * self.duration / taken) - 1, 0)
+            if turns == known:
+                break
         return max(turns + self.more, 0)
 
     @property
