@@ -1,5 +1,6 @@
 """Functions kept between processes: the same answer, and nothing but what was written is ever read."""
 
+import errno
 import shutil
 import subprocess
 import sys
@@ -179,6 +180,17 @@ def test_where_the_folder_cannot_be_made_everything_is_made_anew(tmp_path, monke
     kept(lambda: "made", "test")
     next_process()
     assert kept(lambda: "made anew", "test") == "made anew"
+
+
+def test_a_disk_that_can_only_be_read_from_is_read(monkeypatch):
+    kept(lambda: "made", "test")
+    next_process()
+
+    def refuse(path):
+        raise OSError(errno.EROFS, "Read-only file system", path)
+
+    monkeypatch.setattr("os.utime", refuse)
+    assert kept(must_not_be_made, "test") == "made"
 
 
 def test_the_files_used_last_are_kept(own_folder, monkeypatch):
