@@ -42,7 +42,8 @@ def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndar
     """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
 
     By the implicit function theorem from the slopes B of the momenta: p_0 = -P_0, P_1 = .. = P_{s-1} = 0
-    and p_1 = P_s are linear in the changes of all positions of the step. All are infinite if those of one step have no solution.
+    and p_1 = P_s are linear in the changes of all positions of the step. All are infinite if one step's
+    equations have no solution.
     """
     n, s, steps = dynamics.dimension, scheme(path.order).degree, len(path.mesh) - 1
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
