@@ -135,7 +135,7 @@ def identity(value: Any) -> Hashable:
 
 
 def _is_own(thing: Any) -> bool:
-    return thing.__module__.split(".")[0] == __name__.split(".")[0]
+    return str(thing.__module__).split(".")[0] == __name__.split(".")[0]
 
 
 def _is_patched(kind: type) -> bool:

@@ -190,6 +190,7 @@ def test_what_may_change_without_a_rebuild_shares_functions():
         float,
         np.float32(1),
         Tripled(1.0),
+        type("Nameless", (), {"__module__": None})(),
     ],
     ids=lambda value: type(value).__name__,
 )
