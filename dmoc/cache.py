@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -55,13 +54,14 @@ def write(name: str, content: bytes) -> None:
     place = folder()
     if place is None:
         return
+    # the same ending: what a process leaves that is killed here is tidied away
+    scratch = Path(place) / f"{os.getpid()}-{name}"
     try:
-        with tempfile.TemporaryDirectory(dir=place) as scratch:
-            whole = Path(scratch) / name
-            whole.write_bytes(hashlib.sha256(content).digest() + content)
-            whole.replace(Path(place) / name)
+        scratch.write_bytes(hashlib.sha256(content).digest() + content)
+        scratch.replace(Path(place) / name)
     except OSError:
-        pass
+        with suppress(OSError):
+            scratch.unlink()
 
 
 def tidy(pattern: str) -> None:

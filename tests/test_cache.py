@@ -163,6 +163,26 @@ def test_a_folder_that_is_a_link_is_not_used(own_folder, tmp_path):
     assert cache.folder() is None
 
 
+def test_what_a_process_leaves_that_is_killed_is_tidied_away(own_folder, monkeypatch):
+    code = "import os, pathlib; pathlib.Path.replace = lambda *_: os._exit(9); from dmoc import cache; "
+    ended = subprocess.run([sys.executable, "-c", code + "cache.write('a.functions', b'content')"])
+    assert ended.returncode == 9 and list(own_folder.iterdir())
+    assert cache.read("a.functions") is None
+    monkeypatch.setattr(cache, "MOST_KEPT", 0)
+    cache.tidy("*.functions")
+    assert not list(own_folder.iterdir())
+
+
+def test_on_a_full_disk_nothing_is_left(own_folder, monkeypatch):
+    def fail(file, content):
+        file.touch()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", fail)
+    cache.write("a.functions", b"content")
+    assert not list(own_folder.iterdir())
+
+
 @pytest.mark.parametrize("given", ["cache", ""])
 def test_a_path_that_is_not_absolute_does_not_count_and_without_a_home_there_is_no_folder(given, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", given)
