@@ -6,7 +6,8 @@ a user's effect or a function of time, is written down anew every time: what suc
 have changed without its numbers having changed.
 
 At the end of a process what is new is written to the user's own folder (`cache`), under a name made of
-the scene, dmoc's source files and the versions of CasADi and Python.
+the scene, dmoc's source files and the versions of CasADi and Python. Scenes with a long table are kept in
+memory alone: each of their files would hold all of it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from functools import cached_property, partial
+from itertools import chain
 from types import FunctionType
 from typing import Any, TypeVar
 
@@ -28,6 +30,8 @@ import numpy as np
 from dmoc import cache
 
 MOST = 500
+# A table of more rows is long; it is known by its digest, under this name.
+MOST_ROWS, TABLE = 100, "a long table"
 
 T = TypeVar("T")
 _known: OrderedDict[Hashable, Any] = OrderedDict()
@@ -77,21 +81,24 @@ def store() -> None:
     unchanged = VERSION and _version() == VERSION
     while _new:
         name, value = _new.popitem()
-        if unchanged:
-            cache.write(_file(name), pickle.dumps(value))
+        file = _file(name)
+        if unchanged and file is not None:
+            cache.write(file, pickle.dumps(value))
     cache.tidy("*.functions")
 
 
 def _read(name: Hashable) -> Any:
-    content = cache.read(_file(name)) if _use_files and VERSION else None
+    file = _file(name) if _use_files and VERSION else None
+    content = None if file is None else cache.read(file)
     try:
         return None if content is None else pickle.loads(content)
     except Exception:  # whatever another build of CasADi raises
         return None
 
 
-def _file(name: Hashable) -> str:
-    return hashlib.sha256(f"{VERSION} {name}".encode()).hexdigest() + ".functions"
+def _file(name: Hashable) -> str | None:
+    text = f"{VERSION} {name}"
+    return None if TABLE in text else hashlib.sha256(text.encode()).hexdigest() + ".functions"
 
 
 def _version() -> str:
@@ -122,7 +129,7 @@ def identity(value: Any) -> Hashable:
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.shape, value.dtype.str, value.tobytes()
     if kind in (tuple, list):
-        return tuple(map(identity, value))
+        return tuple(map(identity, value)) if len(value) <= MOST_ROWS else (TABLE, _digest(value))
     kind = value if isinstance(value, type) else kind
     if not _is_own(kind) or _is_patched(kind):
         raise TypeError(kind)
@@ -132,6 +139,17 @@ def identity(value: Any) -> Hashable:
     if not fields and vars(value):
         raise TypeError(kind)
     return kind, tuple(identity(getattr(value, name)) for name in fields)
+
+
+def _digest(rows: Any) -> str:
+    """Of a long table; one of floats alone is not looked at number by number, which would take long."""
+    nested = set(map(type, rows)) == {tuple}
+    numbers = list(chain.from_iterable(rows)) if nested else rows
+    if set(map(type, numbers)) == {float} and (not nested or len(set(map(len, rows))) == 1):
+        content = repr((len(rows), nested)).encode() + np.array(numbers).tobytes()
+    else:
+        content = repr(tuple(map(identity, rows))).encode()
+    return hashlib.sha256(content).hexdigest()
 
 
 def _is_own(thing: Any) -> bool:

@@ -142,6 +142,15 @@ def test_objects_of_the_user_are_never_written(own_folder):
     assert not own_folder.exists() or not files(own_folder)
 
 
+def test_a_scene_with_a_long_table_has_no_files(own_folder):
+    """Each would hold the table: a few scenes with 20,000 rows took 135 MB, and seconds at the end."""
+    assert kept(lambda: "made", "test", tuple(range(1000))) == "made"
+    assert kept(must_not_be_made, "test", tuple(range(1000))) == "made"
+    next_process()
+    assert not own_folder.exists() or not files(own_folder)
+    assert kept(lambda: "made anew", "test", tuple(range(1000))) == "made anew"
+
+
 def test_the_folder_is_private(own_folder):
     assert cache.folder() == str(own_folder)
     assert own_folder.stat().st_mode & 0o077 == 0

@@ -216,3 +216,32 @@ def test_numbers_that_python_calls_equal_are_told_apart(pair):
     assert identity(pair[0]) != identity(pair[1])
     assert identity(BoxForce(1.0)) != identity(BallForce(1.0))
     assert identity(np.nan) == identity(float("nan"))
+
+
+LONG = tuple(0.1 * i for i in range(1, 2001))
+ROWS = tuple(zip(LONG, LONG, strict=True))
+TABLES = {
+    "numbers": LONG,
+    "last digit": (*LONG[:-1], np.nextafter(LONG[-1], 0).item()),
+    "sign of zero": (*LONG[:-1], 0.0),
+    "other sign": (*LONG[:-1], -0.0),
+    "whole number": (*LONG[:-1], 200),
+    "float of it": (*LONG[:-1], 200.0 + 1e-9),
+    "shorter": LONG[:-1],
+    "rows of one": tuple((x,) for x in LONG),
+    "rows": ROWS,
+    "halves": tuple(zip(LONG[::2], LONG[1::2], strict=True)),
+    "ragged": (*ROWS[:-2], LONG[:1], LONG[:3]),
+    "otherwise ragged": (*ROWS[:-2], LONG[:3], LONG[:1]),
+    "words": tuple(map(str, LONG)),
+}
+
+
+def test_long_tables_are_told_apart_too():
+    digests = {name: identity(table) for name, table in TABLES.items()}
+    assert len(set(digests.values())) == len(TABLES)
+    assert identity(list(LONG)) == identity(LONG) and len(repr(identity(ROWS))) < 100
+    with pytest.raises(TypeError):
+        identity((*LONG, Fixed(1.0)))
+    with pytest.raises(TypeError):
+        identity((*ROWS, (1.0, Fixed(1.0))))
