@@ -2,13 +2,13 @@
 
 A block is a function of a few variables that is evaluated `count` times, each time on other columns
 of the unknowns and into other rows of the constraints. The exact derivatives of one evaluation
-(CasADi SX) are mapped, and one sparse product puts them at their places in the global Jacobian and
-Hessian. Nothing here loops over the evaluations, and nothing here knows mechanics.
+(CasADi SX) are mapped, and picked to their places in the global Jacobian and Hessian. Nothing here loops
+over the evaluations, and nothing here knows mechanics.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -34,8 +34,6 @@ class Kernel:
         and those d and p that are needed; "hessian" also of multipliers and weight.
     used : lists of int
         Which d and which p these are.
-    linear : bool
-        Whether the rows are linear in z.
     jacobian, hessian : Sparsity
         Of the rows, and of the upper triangle of weight cost + multipliers . rows.
     costly : bool
@@ -47,7 +45,6 @@ class Kernel:
     name: str
     functions: dict[str, ca.Function]
     used: tuple[list[int], list[int]]
-    linear: bool
     jacobian: ca.Sparsity
     hessian: ca.Sparsity
     costly: bool
@@ -87,8 +84,7 @@ def kernel(name: str, variables: ca.SX, data: ca.SX, parameters: ca.SX, rows: ca
         for kind, result in outputs.items()
     }
     slope = ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)])
-    linear, costly = not _used(variables, jacobian), not cost.is_zero()
-    return Kernel(name, functions, used, linear, jacobian.sparsity(), hessian.sparsity(), costly, slope)
+    return Kernel(name, functions, used, jacobian.sparsity(), hessian.sparsity(), not cost.is_zero(), slope)
 
 
 def _used(symbols: ca.SX, *results: ca.SX) -> list[int]:
@@ -157,32 +153,11 @@ def assemble(
     x, parameters = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
     scaled, multipliers = x * _constant(column_scale), lam_g * _constant(row_scale)
+    vectors = scaled, parameters, multipliers, cost_scale * lam_f
     pieces: dict[str, list] = {kind: [] for kind in ("rows", "cost", "gradient", "jacobian", "hessian")}
     for block in blocks:
-        d, p = block.kernel.used
-        values, numbers = block.values[d], parameters[p]
-        given = [_columns(scaled, block.columns), ca.DM(values), ca.repmat(numbers, 1, block.count)]
-        dual = [_columns(multipliers, block.targets), ca.repmat(cost_scale * lam_f, 1, block.count)]
-        # the slopes of linear rows over equal steps
-        alike = block.kernel.linear and (values == values[:, :1]).all()
-        places = {
-            "rows": block.targets,
-            "cost": np.zeros((1, block.count), int),
-            "gradient": block.columns,
-            "jacobian": _jacobian_places(block, rows),
-            "hessian": _hessian_places(block, columns),
-        }
-        functions = block.kernel.compiled if compiled else block.kernel.functions
-        for kind, function in functions.items():
-            # an output that is empty or structurally zero is not worth a map
-            if function.numel_out(0) == 0 or (kind in ("cost", "gradient") and not block.kernel.costly):
-                continue
-            if kind == "jacobian" and alike:
-                one = function(given[0][:, 0], values[:, 0], numbers)
-                found = ca.repmat(one, 1, block.count)
-            else:
-                found = function.map(block.count)(*given, *(dual if kind == "hessian" else ()))
-            pieces[kind].append((found, places[kind]))
+        for kind, piece in _evaluated(block, *vectors, compiled):
+            pieces[kind].append((piece, _places(block, kind, rows, columns)))
 
     f = cost_scale * sum((ca.sum2(piece) for piece, _ in pieces["cost"]), ca.MX(0))
     g = _summed(pieces["rows"], row_scale)
@@ -223,17 +198,30 @@ def _columns(vector: ca.MX, places: np.ndarray) -> ca.MX:
     return ca.reshape(vector[places.ravel(order="F").tolist()], *places.shape)
 
 
-def _jacobian_places(block: Block, rows: int) -> np.ndarray:
-    """Global place, column * rows + row, of every nonzero of every evaluation."""
-    row, column = block.kernel.jacobian.get_triplet()
-    return block.columns[column] * rows + block.targets[row]
+def _evaluated(
+    block: Block, unknowns: ca.MX, parameters: ca.MX, multipliers: ca.MX, weight: ca.MX, compiled: bool
+) -> Iterator[tuple[str, ca.MX]]:
+    """Every result of a block that is not zero by its structure: one evaluation a column."""
+    kernel, count = block.kernel, block.count
+    d, p = kernel.used
+    given = [_columns(unknowns, block.columns), ca.DM(block.values[d]), ca.repmat(parameters[p], 1, count)]
+    dual = [_columns(multipliers, block.targets), ca.repmat(weight, 1, count)]
+    for kind, function in (kernel.compiled if compiled else kernel.functions).items():
+        if function.numel_out(0) and (kernel.costly or kind not in ("cost", "gradient")):
+            yield kind, function.map(count)(*given, *(dual if kind == "hessian" else ()))
 
 
-def _hessian_places(block: Block, columns: int) -> np.ndarray:
-    """The same for the upper triangle of the Hessian."""
-    row, column = block.kernel.hessian.get_triplet()
-    first, second = block.columns[row], block.columns[column]
-    return np.maximum(first, second) * columns + np.minimum(first, second)
+def _places(block: Block, kind: str, rows: int, columns: int) -> np.ndarray:
+    """Where the results belong: unknowns, rows or, in a matrix, column * rows + row of every nonzero."""
+    if kind == "jacobian":
+        row, column = block.kernel.jacobian.get_triplet()
+        return block.columns[column] * rows + block.targets[row]
+    if kind == "hessian":
+        row, column = block.kernel.hessian.get_triplet()
+        first, second = block.columns[row], block.columns[column]
+        # the upper triangle
+        return np.maximum(first, second) * columns + np.minimum(first, second)
+    return {"rows": block.targets, "gradient": block.columns, "cost": np.empty(0)}[kind]
 
 
 def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], scale: np.ndarray) -> ca.MX:

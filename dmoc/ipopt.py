@@ -62,7 +62,7 @@ def tolerance(mesh: np.ndarray, degree: int, limited: bool) -> float:
 def settings_for(nlp: NLP, warm: bool = False, carried: bool = False) -> dict[str, Any]:
     """Options of `nlpsol` and Ipopt, chosen by measurement over all problems.
 
-    `warm` if multipliers are known, `carried` if they and the path come from another mesh.
+    `warm` if multipliers are known, `carried` if they and the path come from the answer on a coarser mesh.
     """
     parts = nlp.assembly
     settings: dict[str, Any] = {

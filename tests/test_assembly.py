@@ -112,12 +112,6 @@ def test_derivatives_are_casadis_own(scene, order, hold):
     assert_derivatives_are_casadis_own(transcribe(SCENES[scene], order=order, hold=hold, mesh=(0, 0.2, 0.3, 1)))
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_derivatives_on_steps_of_the_same_length_are_casadis_own(scene):
-    """Where the slopes of linear rows are evaluated once: fourths are the same to the last digit."""
-    assert_derivatives_are_casadis_own(transcribe(SCENES[scene], order=4, steps=4))
-
-
 def assert_derivatives_are_casadis_own(nlp):
     parts, (x, p, multipliers) = nlp.assembly, random_point(nlp)
     sigma, lam = ca.MX.sym("sigma"), ca.MX.sym("lam", nlp.rows.size)
