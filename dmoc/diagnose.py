@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from dmoc.actuators import BallForce, BoxForce
+from dmoc.actuators import BallForce
 from dmoc.constraints import KeepOut, SpeedLimit
+from dmoc.limit_words import down, force_words, speed_limit, times, up
 from dmoc.mesh import Guess
 from dmoc.objectives import Effort
 from dmoc.problem import TransferProblem
@@ -18,6 +19,8 @@ from dmoc.transcription import NLP, transcribe_onto, units_of
 
 # The least slack of a limit on the way to a duration that needs less: a tenth of the limit.
 LEAST = -0.9
+# A limit is off by a unit, or by more, where the guess takes so many times more than it on average.
+FAR_OFF = 10.0
 # How deep a chord between two nodes cuts into a zone that is leapt across, in radii; how many zones are tried.
 LEAP, MOST_ZONES = 0.1, 8
 # How many durations are tried, by what factor's logarithm each differs from the one before at most, and
@@ -60,7 +63,9 @@ class Cause:
 def cause_of(problem: TransferProblem, guess: Guess) -> Cause:
     """Why there is no path near a guess, found on its mesh: limits relaxed one by one, then every row."""
     case = _Case(problem, guess)
-    limits = [part for part in (case.force(), case.speed()) if part is not None]
+    if (far := _far_off(case)) is not None:
+        return far
+    limits = case.limits()
     if not limits:
         return case.rows()
     joint = case.relaxed(*limits, least=LEAST)
@@ -75,29 +80,69 @@ def cause_of(problem: TransferProblem, guess: Guess) -> Cause:
     for part in limits:
         alone = found if len(limits) == 1 else case.relaxed(part)(case.problem, case.guess)
         if alone.feasible:
-            needs.append(part.words(float(alone.slack[0])))
-    needs += case.duration(joint, found)
+            needs.append(part.words(alone))
+    needs += case.duration(joint, found, case.problem.duration_bounds[0])
     return Cause(needs=tuple(needs), excess=float(found.slack[0])) if needs else case.rows()
+
+
+def _far_off(case: _Case) -> Cause | None:
+    """What is enough where limits are too small by orders of magnitude, in units of what the guess takes.
+
+    In units of such limits the slacks are so large that no solver finds them. The force that is needed falls
+    with the square of the duration where nothing else acts, the speed with the duration: that is where a
+    duration is looked for.
+    """
+    force, speed = (ratio if FAR_OFF < ratio < np.inf else 1.0 for ratio in case.taken())
+    if force == speed == 1.0:
+        return None
+    problem, longest = case.problem, case.problem.duration_bounds[1]
+    zones = tuple(times(part, speed) if isinstance(part, SpeedLimit) else part for part in problem.constraints)
+    raised = replace(problem, actuator=times(problem.actuator, force), constraints=zones)
+    case = _Case(raised, case.guess, given=problem)
+    parts = [part for part, ratio in ((case.force(), force), (case.speed(), speed)) if part and ratio > 1]
+    found = case.relaxed(*parts, least=LEAST)(raised, case.guess)
+    # a guess may take so much more than is needed that the least slack is not enough
+    if not found.feasible or case.jumps(found.path) or found.slack[0] < 0.99 * LEAST:
+        return None
+    needs = [" and ".join(part.words(found) for part in parts)]
+    longer = longest * max(part.factor(found.slack[0]) ** (1 / part.falls) for part in parts)
+    later = _Case(replace(problem, duration=longer), case.guess)
+    joint = later.relaxed(*later.limits(), least=LEAST)
+    near = joint(later.problem, later.guess)
+    needs += later.duration(joint, near, longest) if near.feasible else []
+    return Cause(needs=tuple(needs), excess=max(part.factor(found.slack[0]) for part in parts))
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Limits that give way together: rows with the sign of their slack, unknowns with their shares."""
+    """Limits that give way together: rows with the sign of their slack, unknowns with their shares.
 
-    words: Any
+    With a slack s what is enough is `factor(s)` times the limit that was given: `told` says so. `falls` is
+    the power of the duration with which that falls.
+    """
+
+    told: Callable[[float], str]
+    factor: Callable[[float], float]
+    falls: int
     rows: np.ndarray
     signs: np.ndarray
     columns: np.ndarray
     below: np.ndarray
     above: np.ndarray
 
+    def words(self, found: Relaxed) -> str:
+        return self.told(self.factor(found.slack[0]))
+
 
 class _Case:
-    """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort."""
+    """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort.
 
-    def __init__(self, problem: TransferProblem, guess: Guess):
+    Limits are told of as those of `given`, which are smaller where they were raised.
+    """
+
+    def __init__(self, problem: TransferProblem, guess: Guess, given: TransferProblem | None = None):
         longest = problem.duration_bounds[1]
-        self.original, self.guess = problem, replace(guess, duration=longest, multipliers={})
+        self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
         self.problem = replace(problem, duration=longest, objective=Effort())
         self.nlp: NLP = transcribe_onto(self.problem, self.guess, units_of(self.problem, self.guess))
         self.bounds = self.nlp.bounds(self.problem)
@@ -111,7 +156,30 @@ class _Case:
         )
         return Relaxation(self.nlp, rows, columns, below, above, least)
 
-    def part(self, pattern: str, words: Any, columns: np.ndarray | None = None) -> _Part | None:
+    def taken(self) -> tuple[float, float]:
+        """How many times the limits of force and of speed the guess takes on average; 0 without a limit.
+
+        Without controls its rows of motion lack the momentum that these would have to give.
+        """
+        nlp, time = self.nlp, self.guess.duration
+        coast, rows = replace(self.guess, control=0 * self.guess.control), nlp.rows["dynamics"]
+        g = nlp.assembly.constraints(nlp.pack(coast), nlp.parameters(self.problem)).full().ravel()
+        force = self.problem.mass * np.linalg.norm(rows.of(g) / rows.scales, axis=1).sum() / time
+        speed = np.linalg.norm(np.diff(coast.position, axis=0), axis=1).sum() / time
+        limits = self.problem.actuator.force_limit(), speed_limit(self.problem)
+        return tuple(size / (limit or np.inf) for size, limit in zip((force, speed), limits, strict=True))
+
+    def limits(self) -> list[_Part]:
+        return [part for part in (self.force(), self.speed()) if part is not None]
+
+    def part(
+        self,
+        pattern: str,
+        told: Callable[[float], str],
+        factor: Callable[[float], float],
+        columns: np.ndarray | None = None,
+        falls: int = 1,
+    ) -> _Part | None:
         """Rows with a limit on one side, of the groups whose names match, and unknowns with limits."""
         lbx, ubx, lbg, ubg = self.bounds
         places = [g.indices.ravel() for g in self.nlp.rows.groups if re.fullmatch(pattern, g.name)]
@@ -122,25 +190,32 @@ class _Case:
         below = np.where(lbx[columns] == -ubx[columns], above, 0.0)
         if not len(rows) and not above.any():
             return None
-        return _Part(words, rows, np.where(np.isfinite(lbg[rows]), 1.0, -1.0), columns, below, above)
+        signs = np.where(np.isfinite(lbg[rows]), 1.0, -1.0)
+        return _Part(told, factor, falls, rows, signs, columns, below, above)
 
     def force(self) -> _Part | None:
         """The limit of the actuator."""
-        actuator = self.problem.actuator
-        if actuator.force_limit() is None:
+        given, limit = self.given.actuator, self.problem.actuator.force_limit()
+        if limit is None:
             return None
         columns = self.nlp.columns["force"].indices.ravel()
-        return self.part("actuator", lambda slack: _force_words(actuator, slack), columns)
+        power = 0.5 if isinstance(given, BallForce) else 1.0
+        raised = limit / (given.force_limit() or limit)
+        told, factor = (
+            (lambda needed: force_words(given, needed)),
+            (lambda slack: raised * (1 + slack) ** power),
+        )
+        return self.part("actuator", told, factor, columns, falls=2)
 
     def speed(self) -> _Part | None:
-        limits = [limit.limit for limit in self.problem.constraints if isinstance(limit, SpeedLimit)]
-        if not limits:
+        limit, given = speed_limit(self.problem), speed_limit(self.given)
+        if limit is None or given is None:
             return None
-        least = min(limits)
-        return self.part(
-            r"speed_limit_\d+|\w+\.speed",
-            lambda slack: f"a speed limit of {_up(least * np.sqrt(1 + slack))} m/s (you gave {least:g} m/s)",
-        )
+
+        def told(needed: float) -> str:
+            return f"a speed limit of {up(given * needed)} m/s (you gave {given:g} m/s)"
+
+        return self.part(r"speed_limit_\d+|\w+\.speed", told, lambda slack: limit / given * np.sqrt(1 + slack))
 
     def zone(self, name: str) -> _Part | None:
         """One keep-out zone."""
@@ -149,24 +224,24 @@ class _Case:
         if not isinstance(zone, KeepOut):
             return None
 
-        def words(slack: float) -> str:
-            radius = _down(zone.radius * np.sqrt(max(1 - slack, 0.0)))
+        def told(factor: float) -> str:
+            radius = down(zone.radius * factor)
             return f"keep-out {index} of at most {radius} m radius (you gave {zone.radius:g} m)"
 
-        return self.part(name, words)
+        return self.part(name, told, lambda slack: np.sqrt(max(1 - slack, 0.0)))
 
-    def duration(self, joint: Relaxation, first: Relaxed) -> list[str]:
+    def duration(self, joint: Relaxation, first: Relaxed, given: float) -> list[str]:
         """A duration for which the limits are enough, by the secant method on logarithms.
 
         The force that is needed falls with the square of the duration where nothing else acts, and
         each duration starts from the answer for the one before.
         """
-        given = self.problem.duration_bounds[0]
+        first_duration = self.problem.duration_bounds[0]
         tried = [(0.0, float(np.log1p(first.slack[0])))]
         step, near, enough = 0.5 * tried[0][1], first, None
         for _ in range(MOST_DURATIONS):
             place = tried[-1][0] + float(np.clip(step, -WIDEST, WIDEST))
-            duration = float(given * np.exp(place))
+            duration = float(first_duration * np.exp(place))
             path = replace(near.path, duration=duration)
             near = joint(replace(self.problem, duration=duration), path, near)
             if not near.feasible:
@@ -182,8 +257,8 @@ class _Case:
             step = -(below + EXACT) / slope if slope else WIDEST
         if enough is None:
             return []
-        needed = given * np.exp(enough)
-        return [f"{_up(needed) if enough > 0 else _down(needed)} s (you gave {given:g} s)"]
+        needed = first_duration * np.exp(enough)
+        return [f"{up(needed) if needed > given else down(needed)} s (you gave {given:g} s)"]
 
     def rows(self) -> Cause:
         """Every row made elastic: which cannot be met, and whether a zone alone is in the way."""
@@ -218,36 +293,6 @@ class _Case:
             part = self.zone(name)
             found = None if part is None else self.relaxed(part)(self.problem, self.guess)
             if part is not None and found is not None and found.feasible and found.slack[0] < 1:
-                needs.append(part.words(float(found.slack[0])))
+                needs.append(part.words(found))
                 excess = max(excess, float(found.slack[0]))
         return Cause(needs=tuple(needs), excess=excess) if needs else None
-
-
-def _force_words(actuator: Any, slack: float) -> str:
-    """The limit that is enough, beside the one given."""
-    if isinstance(actuator, BallForce):
-        return f"a force limit of {_up(actuator.limit * np.sqrt(1 + slack))} N (you gave {actuator.limit:g} N)"
-    if isinstance(actuator, BoxForce) and isinstance(actuator.limit, tuple):
-        needed = ", ".join(_up(limit * (1 + slack)) for limit in actuator.limit)
-        given = ", ".join(f"{limit:g}" for limit in actuator.limit)
-        return f"force limits of ({needed}) N (you gave ({given}) N)"
-    given = actuator.force_limit()
-    name = "force limit" if isinstance(actuator, BoxForce) else "largest thrust"
-    return f"a {name} of {_up(given * (1 + slack))} N (you gave {given:g} N)"
-
-
-def _up(value: float) -> str:
-    """Four digits, rounded away from what is too little."""
-    return _rounded(value, np.ceil)
-
-
-def _down(value: float) -> str:
-    return _rounded(value, np.floor)
-
-
-def _rounded(value: float, how: Any) -> str:
-    if value <= 0:
-        return "0"
-    unit = 10.0 ** (np.floor(np.log10(value)) - 3)
-    # a whole number of units stays what it is
-    return f"{how(round(value / unit, 2)) * unit:.10g}"

@@ -15,8 +15,6 @@ from dmoc.transcription import NLP
 # The effort's weight beside the slack: it makes the path unique, and moves the slack by about as much.
 EFFORT_SHARE = 1e-4
 MOST_ITERATIONS = 200
-# Where the slack of a limit starts: a mistaken unit makes it a thousand times too small.
-FAR = 1e3
 # Rows of a path that meets them, scaled.
 MET = 1e-7
 WARM = {
@@ -119,7 +117,7 @@ class Relaxation:
         lbx[self.columns], ubx[self.columns] = -np.inf, np.inf
         none = np.full(len(low), np.inf)
         solver = self.solver if near is None else self.warm
-        slack = np.full(self.count, FAR if self.count == 1 else 1.0) if near is None else near.slack
+        slack = np.ones(self.count) if near is None else near.slack
         bounds = {
             "lbx": np.concatenate([lbx, np.full(self.count, self.least)]),
             "ubx": np.concatenate([ubx, free]),

@@ -18,12 +18,14 @@ from dmoc import (
     Fuel,
     KeepIn,
     KeepOut,
+    LinearDrag,
     Nozzles,
     SolveError,
     SpeedLimit,
     State,
     Time,
     TransferProblem,
+    UniformGravity,
     solve,
 )
 from dmoc.library import load_problem
@@ -54,7 +56,6 @@ LIMITED = {
     "one axis": (lambda f: rest_to_rest([1.0], 1.9, actuator=BoxForce(f)), 1.0, 4 / 1.9**2),
     "drone": (lambda f: named("drone_hop", limit=f), 11.0, None),
     "too weak to hover": (lambda f: named("drone_hop", limit=f), 9.0, None),
-    # a mistaken unit: a thousand times too small
     "kN for N": (
         lambda f: rest_to_rest((4.0, 1.0), 4.0, actuator=BallForce(f)),
         1e-3,
@@ -82,6 +83,61 @@ def test_the_limit_that_is_enough(name):
     assert known is None or needed == pytest.approx(known, rel=2e-3)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
+
+
+def heavy_hop(limit):
+    """A body of four tonnes that is to hop over a wall with 18 N."""
+    parts = {"effects": [UniformGravity((0, -9.81)), LinearDrag(0.3)], "constraints": [KeepOut((3, 0), 1.0)]}
+    still = (0, 0)
+    return TransferProblem(
+        4000.0, State(still, still), State((6, 0.5), still), 3.0, actuator=BallForce(limit), **parts
+    )
+
+
+# limits that are off by a unit or by more: what is enough does not depend on by how much
+FAR_OFF = {
+    "hop": (heavy_hop, 18.0, 43330.0),
+    "past three obstacles": (LIMITED["past three obstacles"][0], 1e-9, 0.2),
+    "nN for N": (LIMITED["kN for N"][0], 1e-9, 4 * np.hypot(4, 1) / 4**2),
+    "each axis its own": (
+        lambda f: rest_to_rest((4.0, 1.0), 4.0, actuator=BoxForce((f, 0.3 * f))),
+        1e-6,
+        1.0,
+    ),
+    "between orbits": (LIMITED["between orbits"][0], 1e-8, 0.01897),
+    "rendezvous": (LIMITED["rendezvous"][0], 1e-12, 0.001141),
+    "nozzles": (LIMITED["nozzles"][0], 1e-10, 1.0),
+    "engine": (LIMITED["engine"][0], 1e-8, 0.6202),
+}
+
+
+@pytest.mark.parametrize("name", FAR_OFF)
+def test_a_limit_that_is_off_by_orders_of_magnitude(name):
+    problem, given, known = FAR_OFF[name]
+    failed = solve(problem(given))
+    needed, said = asked_for(failed, "(?:force limits?|thrust) of [(]?#.*?.you gave [(]?#")
+    assert said == given and needed == pytest.approx(known, rel=2e-3)
+    assert len({level.steps for level in failed.ladder}) == 1
+    assert solve(problem(1.01 * needed)).success
+    assert not solve(problem(0.97 * needed), steps=100).success
+
+
+def test_far_off_limits_of_force_and_speed_together():
+    def weak(force, speed):
+        return rest_to_rest((10.0, 0.0), 5.0, actuator=BallForce(force), constraints=[SpeedLimit(speed)])
+
+    failed = solve(weak(1e-6, 1e-7))
+    force, _ = asked_for(failed, "a force limit of # N .you gave # N. and a speed limit")
+    speed, _ = asked_for(failed, "and a speed limit of # m/s .you gave # m/s")
+    assert solve(weak(1.01 * force, 1.01 * speed)).success
+    assert not solve(weak(0.97 * force, 0.97 * speed), steps=100).success
+
+
+@pytest.mark.parametrize("limit", [1e-4, 1e-9])
+def test_the_duration_for_a_limit_that_is_far_off(limit):
+    failed = solve(rest_to_rest([1.0], 1.9, actuator=BoxForce(limit)))
+    needed, said = asked_for(failed, "# s .you gave # s")
+    assert said == 1.9 and needed == pytest.approx(2 / np.sqrt(limit), rel=1e-3)
 
 
 BRIEF = {

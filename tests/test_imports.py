@@ -79,7 +79,8 @@ MAY_IMPORT = {
     "solution": "BASICS mesh problem results",  # results: save and load, see ALLOWED_CYCLES
     "results": "BASICS mesh problem solution",
     "relaxation": "BASICS NLP",
-    "diagnose": "BASICS PARTS NLP relaxation",
+    "limit_words": "PARTS problem",
+    "diagnose": "BASICS PARTS NLP limit_words relaxation",
     "faults": "BASICS PARTS EFFECTS NLP",
     "climb": "BASICS NLP MOTION solution diagnose faults tube",
     "refine": "BASICS NLP MOTION solution climb",
