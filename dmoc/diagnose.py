@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.actuators import BallForce
+from dmoc.actuators import BallForce, BoxForce, FreeForce
 from dmoc.constraints import KeepOut, SpeedLimit
-from dmoc.limit_words import down, force_words, speed_limit, times, up
+from dmoc.ipopt import make_solver, path_of, run
+from dmoc.limit_words import down, force_words, speed_limit, times, times_of_limit, up
 from dmoc.mesh import Guess
 from dmoc.objectives import Effort
 from dmoc.problem import TransferProblem
-from dmoc.relaxation import MET, Relaxation, Relaxed
+from dmoc.relaxation import MET, MOST_ITERATIONS, Relaxation, Relaxed
 from dmoc.transcription import NLP, transcribe_onto, units_of
 
 # The least slack of a limit on the way to a duration that needs less: a tenth of the limit.
@@ -71,7 +72,7 @@ def cause_of(problem: TransferProblem, guess: Guess) -> Cause:
     joint = case.relaxed(*limits, least=LEAST)
     found = joint(case.problem, case.guess)
     if not found.feasible:
-        return case.rows()
+        return _unlimited(case) or case.rows()
     if case.jumps(found.path):
         return case.zones() or case.rows()
     if found.slack[0] <= MET:
@@ -101,8 +102,10 @@ def _far_off(case: _Case) -> Cause | None:
     case = _Case(raised, case.guess, given=problem)
     parts = [part for part, ratio in ((case.force(), force), (case.speed(), speed)) if part and ratio > 1]
     found = case.relaxed(*parts, least=LEAST)(raised, case.guess)
+    if not found.feasible:
+        return _unlimited(case)
     # a guess may take so much more than is needed that the least slack is not enough
-    if not found.feasible or case.jumps(found.path) or found.slack[0] < 0.99 * LEAST:
+    if case.jumps(found.path) or found.slack[0] < 0.99 * LEAST:
         return None
     needs = [" and ".join(part.words(found) for part in parts)]
     longer = longest * max(part.factor(found.slack[0]) ** (1 / part.falls) for part in parts)
@@ -111,6 +114,25 @@ def _far_off(case: _Case) -> Cause | None:
     near = joint(later.problem, later.guess)
     needs += later.duration(joint, near, longest) if near.feasible else []
     return Cause(needs=tuple(needs), excess=max(part.factor(found.slack[0]) for part in parts))
+
+
+def _unlimited(case: _Case) -> Cause | None:
+    """The force that least effort takes without a limit: more than the least, but sooner found."""
+    given = case.given.actuator
+    if not isinstance(given, (BallForce, BoxForce)):
+        return None
+    problem = replace(case.problem, actuator=FreeForce(), constraints=case.given.constraints)
+    nlp = transcribe_onto(problem, case.guess, units_of(problem, case.guess))
+    answer = run(make_solver(nlp, {"ipopt.max_iter": MOST_ITERATIONS}), nlp, problem, case.guess)
+    path = replace(path_of(nlp, problem, answer), multipliers={})
+    if answer.status != "solved" or case.jumps(path):
+        return None
+    factor = times_of_limit(given, path.control)
+    if factor <= 1:
+        return Cause(path=path)
+    needs = (f"no more than {force_words(given, factor)}",)
+    # what is not much more may not be needed
+    return Cause(needs=needs, excess=factor if factor > FAR_OFF else np.inf)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,12 @@ def speed_limit(problem: TransferProblem) -> float | None:
     return min((limit.limit for limit in problem.constraints if isinstance(limit, SpeedLimit)), default=None)
 
 
+def times_of_limit(actuator: BallForce | BoxForce, control: np.ndarray) -> float:
+    """How many times the limit of an actuator the largest of some forces is."""
+    share = np.abs(control) / np.asarray(actuator.limit)
+    return float(np.linalg.norm(share, axis=1).max() if isinstance(actuator, BallForce) else share.max())
+
+
 def times(part: Any, factor: float) -> Any:
     """An actuator or a constraint with limits so many times as large."""
     names = {field.name for field in fields(part)} if is_dataclass(part) else set()

@@ -26,6 +26,7 @@ from dmoc import (
     Time,
     TransferProblem,
     UniformGravity,
+    relaxation,
     solve,
 )
 from dmoc.library import load_problem
@@ -131,6 +132,19 @@ def test_far_off_limits_of_force_and_speed_together():
     speed, _ = asked_for(failed, "and a speed limit of # m/s .you gave # m/s")
     assert solve(weak(1.01 * force, 1.01 * speed)).success
     assert not solve(weak(0.97 * force, 0.97 * speed), steps=100).success
+
+
+@pytest.mark.parametrize("make", [BallForce, lambda limit: BoxForce((limit, 0.5 * limit))])
+def test_where_the_least_limit_is_not_found_one_that_is_enough_is_named(make, monkeypatch):
+    """On many revolutions the slack of the limit takes hundreds of iterations; here it is given too few."""
+    monkeypatch.setattr(relaxation, "MOST_ITERATIONS", 2)
+    problem = replace(named("orbit_raise"), actuator=make(1e-4))
+    failed = solve(problem)
+    found = re.search(
+        rf"needs no more than a? ?force limits? of [(]?{NUMBER}.*you gave [(]?0.0001", failed.message
+    )
+    assert found, failed.message
+    assert solve(replace(problem, actuator=make(1.01 * float(found[1])))).success
 
 
 @pytest.mark.parametrize("limit", [1e-4, 1e-9])
