@@ -157,11 +157,12 @@ def test_a_warm_start_from_its_own_plan_takes_next_to_no_iterations():
     inputs, cold, warm = made(FLYER)
     plan = cold(**inputs)
     again = warm(**handed_back(inputs, plan))
-    assert warm.stats()["iter_count"] <= 3 < cold.stats()["iter_count"]
+    few = warm.stats()["iter_count"]
+    assert few <= 2 < cold.stats()["iter_count"]
     assert float(again["objective"]) == pytest.approx(float(plan["objective"]), rel=1e-8)
     without = {name: 0 if "multipliers" in name else value for name, value in handed_back(inputs, plan).items()}
     warm(**without)
-    assert warm.stats()["iter_count"] > 3, "the multipliers must matter"
+    assert warm.stats()["iter_count"] > few, "the multipliers must matter"
 
 
 def test_the_status_is_there_after_loading(tmp_path):
