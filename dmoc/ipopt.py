@@ -98,9 +98,9 @@ def settings_for(nlp: NLP, warm: bool = False, carried: bool = False) -> dict[st
         if warm:
             # near the optimum full steps can go to and fro, 2,700 of them were seen, for hardly less violation
             settings["ipopt.gamma_theta"] = 1e-2
-    elif nlp.problem.limited and warm and not carried:
-        # another start or limit: 79 iterations instead of 149 over twelve changes of five problems; from
-        # another mesh it would be up to 13 times as many
+    elif nlp.problem.limited and nlp.problem.actuator.smoothing is None and warm and not carried:
+        # another start or limit: 78 iterations instead of 143 over eleven changes of four problems; from
+        # another mesh, or with another rounding of |F|, it would be up to 13 times as many
         settings["ipopt.mu_strategy"] = "adaptive"
     if warm:
         # interpolated values break the equations: 1e-8 away from a limit the first steps would be cut short.
