@@ -92,16 +92,7 @@ def settings_for(nlp: NLP, warm: bool = False, carried: bool = False) -> dict[st
         settings["ipopt.mumps_permuting_scaling"] = 0
         if len(nlp.mesh) > 1000:
             settings["ipopt.mumps_pivot_order"] = 5
-    if nlp.problem.objective.metered and nlp.problem.actuator.smoothing is not None:
-        # with |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations
-        settings |= {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
-        if warm:
-            # near the optimum full steps can go to and fro, 2,700 of them were seen, for hardly less violation
-            settings["ipopt.gamma_theta"] = 1e-2
-    elif nlp.problem.limited and nlp.problem.actuator.smoothing is None and warm and not carried:
-        # another start or limit: 78 iterations instead of 143 over eleven changes of four problems; from
-        # another mesh, or with another rounding of |F|, it would be up to 13 times as many
-        settings["ipopt.mu_strategy"] = "adaptive"
+    settings |= _barrier(nlp.problem, warm, carried)
     if warm:
         # interpolated values break the equations: 1e-8 away from a limit the first steps would be cut short.
         # A thousandth takes 1,173 iterations, not 1,309, on the last meshes of eleven problems, 42 variants.
@@ -110,6 +101,21 @@ def settings_for(nlp: NLP, warm: bool = False, carried: bool = False) -> dict[st
         settings |= {"ipopt.warm_start_init_point": "yes", "ipopt.mu_init": 1e-6}
         settings |= {f"ipopt.warm_start_{name}": push for name in pushed}
     return settings
+
+
+def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, Any]:
+    """How the barrier falls, where it is not best that it only falls."""
+    rounded = problem.actuator.smoothing is not None
+    if rounded and problem.objective.metered:
+        # with |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations
+        settings: dict[str, Any] = {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
+        # near the optimum full steps can go to and fro, 2,700 of them were seen, for hardly less violation
+        return settings | ({"ipopt.gamma_theta": 1e-2} if warm else {})
+    if problem.limited and not rounded and warm and not carried:
+        # another start or limit: 78 iterations instead of 143 over eleven changes of four problems; from
+        # another mesh, or with another rounding of |F|, it would be up to 13 times as many
+        return {"ipopt.mu_strategy": "adaptive"}
+    return {}
 
 
 def make_solver(
