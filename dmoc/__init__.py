@@ -12,9 +12,10 @@ __version__ = "0.1.0"
 
 # Imported on first use, so that `dmoc --help` answers before CasADi is loaded.
 _HOMES = {
-    "dmoc.actuators": ("Actuator", "BallForce", "BoxForce", "FreeForce"),
-    "dmoc.boundary": ("Boundary", "Condition", "Moving", "State"),
-    "dmoc.constraints": ("ApproachCone", "Constraint", "KeepIn", "KeepOut", "SpeedLimit"),
+    "dmoc.scene.actuator": ("Actuator",),
+    "dmoc.scene.forces": ("BallForce", "BoxForce", "FreeForce"),
+    "dmoc.scene.ends": ("Boundary", "Condition", "Moving", "State"),
+    "dmoc.scene.constraints": ("ApproachCone", "Constraint", "KeepIn", "KeepOut", "SpeedLimit"),
     "dmoc.effects": (
         "J2",
         "Atmosphere",
@@ -41,10 +42,10 @@ _HOMES = {
         "tabulated_motion",
         "three_body",
     ),
-    "dmoc.engines": ("Engine", "Nozzles"),
-    "dmoc.exporting": ("export",),
-    "dmoc.long_run": ("drift",),
-    "dmoc.objectives": (
+    "dmoc.scene.engines": ("Engine", "Nozzles"),
+    "dmoc.exports.export": ("export",),
+    "dmoc.studies.drift": ("drift",),
+    "dmoc.scene.objectives": (
         "Effort",
         "FinalHeight",
         "FinalMass",
@@ -54,16 +55,16 @@ _HOMES = {
         "Time",
         "WeightedSum",
     ),
-    "dmoc.orbits": ("CircularOrbit", "Orbit"),
-    "dmoc.problem": ("TransferProblem",),
-    "dmoc.rows": ("Row",),
-    "dmoc.simulation": ("Trajectory", "simulate"),
-    "dmoc.solution": ("Solution", "SolveError", "load"),
-    "dmoc.solver": ("solve",),
-    "dmoc.study": ("Formulation", "work_precision"),
-    "dmoc.sweeping": ("sweep",),
-    "dmoc.transcription": ("NLP", "transcribe"),
-    "dmoc.verification": ("Report", "verify"),
+    "dmoc.scene.orbits": ("CircularOrbit", "Orbit"),
+    "dmoc.scene.problem": ("TransferProblem",),
+    "dmoc.scene.rows": ("Row",),
+    "dmoc.motion.march": ("Trajectory", "simulate"),
+    "dmoc.results.solution": ("Solution", "SolveError", "load"),
+    "dmoc.solver.solve": ("solve",),
+    "dmoc.studies.accuracy": ("Formulation", "work_precision"),
+    "dmoc.sweeps.sweep": ("sweep",),
+    "dmoc.nlp.transcription": ("NLP", "transcribe"),
+    "dmoc.checks.verification": ("Report", "verify"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = sorted(_HOME_OF)

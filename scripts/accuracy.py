@@ -24,10 +24,10 @@ from alternatives import METHODS, radau
 from references import TABLE
 
 from dmoc import solve
-from dmoc.kept import forget, store
-from dmoc.library import load_problem
-from dmoc.problem import TransferProblem
-from dmoc.study import TARGETS, time_to_reach, work_precision
+from dmoc.basics.memory import forget, store
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.problem_file import load_problem
+from dmoc.studies.accuracy import TARGETS, time_to_reach, work_precision
 
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- accuracy -->\n).*?(?=<!-- end of accuracy -->)", re.DOTALL)

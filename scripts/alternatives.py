@@ -7,7 +7,7 @@ force that is free or limited (FreeForce, BoxForce, BallForce).
 
     dmoc study orbit_raise --against scripts/alternatives.py --plot study.png
 
-A method takes (problem, steps) and returns a `dmoc.study.Formulation`; any file with a dictionary
+A method takes (problem, steps) and returns a `dmoc.studies.accuracy.Formulation`; any file with a dictionary
 METHODS of such functions can stand in place of this one.
 
 References
@@ -26,11 +26,11 @@ from scipy.interpolate import CubicSpline
 
 from dmoc import State, TransferProblem
 from dmoc.effects import Force
-from dmoc.guess import starting_guess
-from dmoc.mechanics import Dynamics, specific_lagrangian
-from dmoc.mesh import uniform_mesh
-from dmoc.study import Formulation
-from dmoc.transcription import units_of
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.dynamics import Dynamics, specific_lagrangian
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.nlp.transcription import units_of
+from dmoc.studies.accuracy import Formulation
 
 
 class Draft:

@@ -37,21 +37,21 @@ from benchmark_report import (
     verdicts,
 )
 
-import dmoc.kept
+import dmoc.basics.memory
 from dmoc import BallForce, PointGravity, State, TransferProblem, solve, verify
-from dmoc.guess import starting_guess
-from dmoc.ipopt import make_solver, path_of, run
-from dmoc.library import load_problem
-from dmoc.mesh import uniform_mesh
-from dmoc.study import Trial, time_to_reach, work_precision
-from dmoc.transcription import transcribe_onto, units_of
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.nlp.ipopt import make_solver, path_of, run
+from dmoc.nlp.transcription import transcribe_onto, units_of
+from dmoc.scene.problem_file import load_problem
+from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
 OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
 TARGET = 1e-6
 # What a solve finds of those before it.
 STATES: dict[str, Callable[[], None]] = {
-    "first": dmoc.kept.forget,
-    "new process": partial(dmoc.kept.forget, files=True),
+    "first": dmoc.basics.memory.forget,
+    "new process": partial(dmoc.basics.memory.forget, files=True),
     "same process": lambda: None,
 }
 ORDERS = {"order 2": 2, "order 4": 4, "order 6": 6, "order 8": 8}
@@ -94,7 +94,7 @@ def _states() -> Iterator[tuple[str, Callable[[], None]]]:
     """What is called before each solve; the cache is filled once the first solves have been seen."""
     for state, before in STATES.items():
         yield state, before
-        dmoc.kept.store()
+        dmoc.basics.memory.store()
 
 
 def _facts(trial: Trial) -> dict[str, Any]:
@@ -182,7 +182,7 @@ def _some(
     meshes: dict[str, list[int]],
     repeats: int,
     optimum: float,
-    before: Callable[[], None] = dmoc.kept.forget,
+    before: Callable[[], None] = dmoc.basics.memory.forget,
 ) -> list[Trial]:
     orders = [ORDERS[method] for method in meshes if method.startswith("order ")]
     others = {method: OTHERS[method] for method in meshes if method in OTHERS}
@@ -259,7 +259,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder
         results = measure(given.largest)
-        dmoc.kept.store()
+        dmoc.basics.memory.store()
     console.print(f"\n{time.perf_counter() - begun:.0f} s")
     if given.json is not None:
         given.json.write_text(json.dumps(results, indent=2))

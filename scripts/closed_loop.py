@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dmoc import export
-from dmoc.library import load_problem
+from dmoc.scene.problem_file import load_problem
 
 STEPS, PERIOD, TICK = 40, 1.0, 0.02
 LAST_PLAN = 2.0  # no new plan when less time than this is left [s]

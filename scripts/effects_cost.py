@@ -28,9 +28,9 @@ from dmoc import (
     circular_motion,
     solve,
 )
-from dmoc.formulas import formulas_of
-from dmoc.kept import forget
-from dmoc.library import load_problem
+from dmoc.basics.memory import forget
+from dmoc.nlp.stencils import formulas_of
+from dmoc.scene.problem_file import load_problem
 
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- effects -->\n).*?(?=<!-- end of effects -->)", re.DOTALL)

@@ -15,15 +15,15 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 from dmoc import solve, sweep, verify
-from dmoc.docstrings import first_line
-from dmoc.library import load_problem
-from dmoc.long_run import drift, kepler, per_revolution
-from dmoc.marching import growth, round_off
-from dmoc.plot import save_figure
-from dmoc.plot_stability import stability_figure
-from dmoc.plot_study import save_page
-from dmoc.plot_sweep import figure
-from dmoc.solution import Solution
+from dmoc.basics.docstrings import first_line
+from dmoc.plots.page import save_figure
+from dmoc.plots.stability import stability_figure
+from dmoc.plots.study import save_page
+from dmoc.plots.sweep import figure
+from dmoc.results.solution import Solution
+from dmoc.scene.problem_file import load_problem
+from dmoc.studies.drift import drift, kepler, per_revolution
+from dmoc.studies.rounding import growth, round_off
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"

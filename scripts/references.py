@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dmoc import solve
-from dmoc.library import load_problem
-from dmoc.solution import Solution
+from dmoc.results.solution import Solution
+from dmoc.scene.problem_file import load_problem
 
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- references -->\n).*?(?=<!-- end of references -->)", re.DOTALL)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import dmoc
-from dmoc.library import catalogue
+from dmoc.scene.problem_file import catalogue
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text()
@@ -58,10 +58,10 @@ def test_nothing_in_the_readme_is_left_out():
 # commands within a line of text, and why some of them are not run
 INLINE = re.findall(r"`\./scripts/run (dmoc [^`]+|python scripts/[^`]+)`", TEXT)
 ELSEWHERE = {
-    "python scripts/references.py --readme": "tests/test_problems.py holds every row",
-    "python scripts/effects_cost.py --readme": "it writes the README; tests/test_influence.py runs the script",
+    "python scripts/references.py --readme": "tests/scene/test_problems.py holds every row",
+    "python scripts/effects_cost.py --readme": "it writes the README; a test of the studies runs it",
     "python scripts/accuracy.py --readme": "it writes the README, in minutes",
-    "python scripts/gallery.py": "it writes the pictures; tests/test_problems.py solves every problem",
+    "python scripts/gallery.py": "it writes the pictures; tests/scene/test_problems.py solves every problem",
 }
 
 

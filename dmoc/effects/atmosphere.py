@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.checks import number, short, vector
+from dmoc.basics.arguments import number, short, vector
 from dmoc.effects.base import Force, Part, need_dimension
 from dmoc.effects.motion import as_column, tried
 

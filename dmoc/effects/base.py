@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from dmoc.docstrings import documented, first_line
+from dmoc.basics.docstrings import documented, first_line
 
 
 class Part:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from dmoc.checks import number, vector
+from dmoc.basics.arguments import number, vector
 from dmoc.effects.base import Conservative, need_dimension
 
 

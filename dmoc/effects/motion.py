@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number, vector
+from dmoc.basics.arguments import number, vector
 from dmoc.effects.base import Part
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.checks import number, short
+from dmoc.basics.arguments import number, short
 from dmoc.effects.base import Force, Part, need_dimension
 from dmoc.effects.motion import given_motion, position_at
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.checks import number
+from dmoc.basics.arguments import number
 from dmoc.effects.base import Conservative, need_dimension
 from dmoc.effects.motion import given_motion, position_at
 

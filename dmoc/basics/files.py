@@ -1,0 +1,88 @@
+"""Files that are written whole or not at all, and that know when they were changed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from dmoc.basics.arguments import short
+
+# Letters of a name; a temporary file beside it has a few more.
+LONGEST = 200
+# What stands before the checksum at the end of a sealed file.
+SEAL = b"\ndmoc sha256 "
+AGAIN = "copy it or write it again"
+
+
+def path_of(path: str | os.PathLike) -> Path:
+    """A path, or a ValueError if it is none."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ValueError(f"a file is named by a text or a path; got {short(path)}")
+    if len(Path(path).name) > LONGEST:
+        raise ValueError(f"the name {short(str(path))} is too long for a file")
+    return Path(path)
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike) -> Iterator[Path]:
+    """A temporary file beside `path`, which takes its name once the block has ended without an error.
+
+    The temporary file keeps the suffix, since writers choose their format by it. After an error it
+    is gone and a former file of that name is as it was.
+
+    Raises
+    ------
+    ValueError
+        If the folder does not exist, or the path is itself a folder.
+    OSError
+        If the disk is full, say.
+    """
+    target = path_of(path)
+    if not target.parent.is_dir():
+        raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
+    if target.exists() and not target.is_file():
+        raise ValueError(f"cannot write {target}: it is a folder, or no file; add a file name")
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        yield temporary
+        with open(temporary, "rb+") as written:
+            # the name must not reach the disk before the contents
+            os.fsync(written.fileno())
+        os.replace(temporary, target)
+    except OSError as error:
+        raise OSError(f"cannot write {target}: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def sealed(content: bytes) -> bytes:
+    """A file's content with a checksum at its end.
+
+    HDF5 says in its header where it ends: other readers pass over what comes after it.
+    """
+    return content + _seal_of(content)
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file has a checksum, which holds: to be asked before a library that trusts it opens it.
+
+    Raises
+    ------
+    ValueError
+        If the checksum does not hold.
+    """
+    whole = path.read_bytes()
+    length = len(_seal_of(b""))
+    found, wanted = whole[-length:], _seal_of(whole[:-length])
+    # a changed byte in the words before the checksum must not make it a file that never had one
+    if found != wanted and sum(a == b for a, b in zip(found, SEAL, strict=False)) > len(SEAL) / 2:
+        raise ValueError(f"{path} is damaged: its checksum does not hold; {AGAIN}")
+    return found == wanted
+
+
+def _seal_of(content: bytes) -> bytes:
+    return SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n"

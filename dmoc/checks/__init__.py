@@ -1,0 +1,1 @@
+"""Not on Ipopt's word: residual, rollout, reference, ledger, bounds, optimality, stability."""

@@ -1,0 +1,153 @@
+"""By how much a path breaks what it must keep: force, duration, mass, boundary, zones and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.checks.evidence import Case
+from dmoc.motion.dynamics import state_symbols
+
+# What the optimiser may leave of a limit, what round-off may leave of an entry that is simply fixed,
+# and how deep a path may cut into a zone between nodes however coarse its mesh.
+BOUND, EXACT, DEEPEST = 1e-6, 1e-9, 1e-2
+# Into how many parts a gap between two nodes is divided, at least, and how many that may be in all.
+FEWEST, MOST_SAMPLES = 8, 1_000_000
+
+
+@dataclass(frozen=True)
+class Excess:
+    """One limit: by how much it is broken, and by how much it may be."""
+
+    name: str
+    value: float
+    allowed: float
+    unit: str
+
+    @property
+    def ok(self) -> bool:
+        return self.value <= self.allowed
+
+    @property
+    def share(self) -> float:
+        """The excess over what is allowed; infinite where it is not a number."""
+        return float(np.nan_to_num(self.value / self.allowed, nan=np.inf))
+
+
+def excesses(case: Case) -> list[Excess]:
+    """Every limit of the problem, as the path keeps it."""
+    return [*_controls(case), *_duration(case), *_boundary(case), *_zones(case)]
+
+
+def _controls(case: Case) -> Iterable[Excess]:
+    """Limits of the actuator, at the nodes or, with hold, in the steps."""
+    actuator, control = case.problem.actuator, case.path.control
+    scale = actuator.force_limit() or case.largest or 1.0
+    yield Excess("force", _most(actuator.excess(control)), BOUND * scale, "N")
+    u = ca.SX.sym("u", control.shape[1])
+    yield from _rows("actuator", actuator.rows(u), [u], [control.T])
+    if actuator.dry_mass > 0:
+        missing = _most(actuator.dry_mass - case.mass)
+        yield Excess("dry mass", missing, BOUND * case.problem.mass, "kg")
+
+
+def _duration(case: Case) -> Iterable[Excess]:
+    shortest, longest = case.problem.duration_bounds
+    beyond = _most(np.array([shortest - case.path.duration, case.path.duration - longest]))
+    yield Excess("duration", beyond, BOUND * longest, "s")
+
+
+def _boundary(case: Case) -> Iterable[Excess]:
+    """Entries that are fixed must be met to round-off, conditions to the optimiser's tolerance."""
+    problem, path = case.problem, case.path
+    t, q, v, m = state_symbols(problem.dimension)
+    for name, place, velocity in (("start", 0, path.start_velocity), ("goal", -1, path.goal_velocity)):
+        end = getattr(problem, name)
+        for kind, wanted, have, allowed, unit in (
+            ("position", end.fixed()[0], case.position[place], EXACT * case.extent + case.rounding, "m"),
+            ("velocity", end.fixed()[1], velocity, EXACT * case.speed, "m/s"),
+        ):
+            yield Excess(f"{name} {kind}", _most(np.abs(have - wanted)[~np.isnan(wanted)]), allowed, unit)
+        state = [case.time[place], case.position[place], velocity, case.mass[place]]
+        yield from _rows(name, end.rows(t, q, v, m), [t, q, v, m], state, {"m": case.extent, "m/s": case.speed})
+
+
+def _rows(
+    owner: str, rows: list, symbols: list, values: list, sizes: dict[str, float] | None = None
+) -> Iterable[Excess]:
+    """Rows as a part of the problem states them, in their own unit."""
+    for row in rows:
+        have = ca.Function("row", symbols, [ca.densify(row.expression)])(*values).full()
+        unit = getattr(row, "unit", "")
+        allowed = BOUND * (sizes or {}).get(unit, 1.0)
+        beyond = _most(np.maximum(row.lower - have, have - row.upper))
+        yield Excess(f"{owner} {row.name}", beyond, allowed, unit or "-")
+
+
+def _zones(case: Case) -> Iterable[Excess]:
+    """Zones at the nodes and between them; a speed limit everywhere.
+
+    Rows act at nodes alone, so between two of them a path may cut into a zone: by what the chord
+    does, d^2 / 8r for nodes a distance d apart at a sphere of radius r, and by how far the path bends
+    away from its chord. A speed limit acts on mean velocities inside the steps, from which those at
+    the nodes differ by half of what they are off the line between their neighbours. All of this is of
+    order h^2, and none of it excuses more than a hundredth.
+    """
+    if not case.problem.constraints:
+        return
+    longest = float(np.linalg.norm(np.diff(case.position, axis=0), axis=1).max())
+    path, chord, velocity, straight = _between(case, longest)
+    bend = _most(np.linalg.norm(path - chord, axis=1))
+    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(case)
+    still = np.zeros_like(path)
+    for i, constraint in enumerate(case.problem.constraints):
+        name = f"{type(constraint).__name__} {i + 1}"
+        if constraint.unit == "m/s":
+            allowed = BOUND * case.speed + min(sway, DEEPEST * case.speed)
+            yield Excess(name, _most(constraint.excess(path, velocity)), allowed, "m/s")
+            continue
+        at_nodes = _most(constraint.excess(case.position, case.node_velocity))
+        yield Excess(f"{name} at nodes", at_nodes, BOUND * case.extent, constraint.unit)
+        radius = getattr(constraint, "radius", None)
+        cut = longest**2 / (8 * radius) if radius else _most(constraint.excess(chord, still))
+        cut = min(cut + bend, DEEPEST * min(radius or np.inf, case.extent))
+        between = _most(constraint.excess(path, still))
+        yield Excess(f"{name} between nodes", between, BOUND * case.extent + cut, constraint.unit)
+
+
+def _between(case: Case, longest: float) -> tuple[np.ndarray, ...]:
+    """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
+
+    The path is the cubic that has the positions and velocities of both nodes; it is looked at often
+    enough not to step over a zone that is smaller than the longest gap [m].
+    """
+    q, v = case.position, case.node_velocity
+    tau = case.path.duration * np.diff(case.path.fractions)[:, None, None]
+    smallest = min(getattr(constraint, "radius", np.inf) for constraint in case.problem.constraints)
+    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_SAMPLES // len(q))))
+    u = (np.arange(parts) / parts)[:, None]
+    mean = np.diff(q, axis=0)[:, None] / tau
+    first, second = v[:-1, None] - mean, v[1:, None] - mean
+    chord = q[:-1, None] + u * tau * mean
+    path = chord + tau * (u * (1 - u) ** 2 * first - u**2 * (1 - u) * second)
+    velocity = mean + (1 - 4 * u + 3 * u**2) * first + (3 * u**2 - 2 * u) * second
+    straight = (1 - u) * v[:-1, None] + u * v[1:, None]
+    inside = (values.reshape(-1, q.shape[1]) for values in (path, chord, velocity, straight))
+    return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
+
+
+def _bump(case: Case) -> float:
+    """How far the velocity at a node is at most off the line between its neighbours in time [m/s]."""
+    time, velocity = case.path.fractions, case.node_velocity
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+    line = (1 - share) * velocity[:-2] + share * velocity[2:]
+    return _most(np.linalg.norm(velocity[1:-1] - line, axis=1))
+
+
+def _most(values: Any) -> float:
+    """The largest of some numbers, at least 0; NaN if one is."""
+    return float(np.max(values, initial=0.0))

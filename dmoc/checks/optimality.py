@@ -1,0 +1,135 @@
+"""Whether a path is a stationary point of its own discrete problem, multipliers and all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.checks.evidence import Case
+from dmoc.motion.mesh import node_weights
+from dmoc.nlp.blocks import Transcript
+from dmoc.nlp.ipopt import scaled_multipliers
+from dmoc.nlp.transcription import NLP, units_of
+
+
+@dataclass(frozen=True)
+class Stationarity:
+    """What is left of the first-order conditions, each relative to the objective or the force [-].
+
+    Attributes
+    ----------
+    force : float
+        Derivative of the Lagrangian along the controls: for least effort |lambda + m F| over the force.
+    path : float
+        The same along positions, masses and ends: the defect of the costate equations, summed up
+        along the path as errors are. Entries that are fixed count: their multipliers are the
+        derivatives of the objective by the boundary data.
+    limits : float
+        Multipliers of limits that do not act, or of the wrong sign, times the distance from the limit.
+    objective : float
+        What the path costs against what the solution says it costs.
+    """
+
+    force: float
+    path: float
+    limits: float
+    objective: float
+
+    @property
+    def largest(self) -> float:
+        return float(np.max([self.force, self.path, self.limits, self.objective]))
+
+
+def stationarity(case: Case) -> Stationarity:
+    """First-order conditions at a solution, from its multipliers.
+
+    Evaluated block by block, without the sparse derivatives that a solve needs.
+    """
+    nlp, blocks = _unassembled(case)
+    lam_x, lam_g = scaled_multipliers(nlp, case.path)
+    x, p = nlp.pack(case.path), nlp.parameters(case.problem)
+    lbx, ubx, lbg, ubg = nlp.bounds(case.problem)
+    slope, rows, cost = _evaluate(blocks, nlp, x, p, lam_g)
+    slope = slope + lam_x
+    weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
+    weights["control"] = weights["step" if nlp.hold else "node"]
+    along = [group.of(slope) for group in nlp.columns.groups if group.kind != "control"]
+    force = nlp.columns["force"]
+    idle = [
+        _idle(layout, multipliers, values, lower, upper, weights)
+        for layout, multipliers, values, lower, upper in (
+            (nlp.columns, lam_x, x, lbx, ubx),
+            (nlp.rows, lam_g, rows, lbg, ubg),
+        )
+    ]
+    stated = case.solution.objective * case.problem.objective.sense / nlp.units.cost
+    return Stationarity(
+        float(np.abs(force.of(slope) / weights["control"][:, None]).max(initial=0.0)),
+        float(np.max([np.abs(np.cumsum(part, axis=0)).max(initial=0.0) for part in along])),
+        float(np.max(idle)),
+        float(abs(cost - stated)),
+    )
+
+
+def _unassembled(case: Case) -> tuple[NLP, list]:
+    """The NLP of a path without its sparse derivatives, and its blocks.
+
+    Its units are those of a body that is pushed at least as hard as it takes to cross the path in the
+    duration: where hardly any force is needed there is nothing to be measured relative to it.
+    """
+    problem, path = case.problem, case.path
+    if case.largest < case.typical_force:
+        path = replace(path, control=np.full_like(path.control, case.typical_force))
+    units = units_of(problem, path)
+    script = Transcript(problem, case.rule, path.hold, path.mesh, units)
+    derivatives: Any = None
+    nlp = NLP(
+        problem,
+        case.dynamics,
+        case.rule,
+        path.hold,
+        path.mesh,
+        units,
+        script.columns,
+        script.rows,
+        script.row_bounds,
+        derivatives,
+    )
+    return nlp, script.blocks
+
+
+def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.ndarray) -> tuple:
+    """Scaled gradient of cost + lam_g . rows, the rows and the cost."""
+    unknowns, multipliers = x * nlp.columns.scales(), lam_g * nlp.rows.scales() * nlp.units.cost
+    slope, rows, cost = np.zeros(len(x)), np.zeros(len(lam_g)), 0.0
+    for block in blocks:
+        known, constant = block.kernel.used
+        given = unknowns[block.columns], block.values[known], p[constant], multipliers[block.targets], 1.0
+        values = block.kernel.slope(*given)
+        np.add.at(slope, block.columns, values[0].full())
+        np.add.at(rows, block.targets, values[1].full())
+        cost += float(values[2].full().sum())
+    return slope * nlp.columns.scales() / nlp.units.cost, rows * nlp.rows.scales(), cost / nlp.units.cost
+
+
+def _idle(layout: Any, multipliers, values, lower, upper, weights: dict) -> float:
+    """Largest multiplier times the distance from its limit, as a density in time.
+
+    Steps shorter than the mean count as the mean: what the barrier leaves at each limit is one
+    number for all, and over the shortest steps of a graded mesh it would look like a price.
+    """
+    room = np.where(multipliers > 0, upper - values, values - lower)
+    # a limit that is not there, or that is far away, must not have a multiplier at all
+    product = np.abs(multipliers) * np.clip(room, 0.0, 1.0)
+    product[lower == upper] = 0.0
+    worst = [
+        (group.of(product) / _not_tiny(weights.get(group.kind, np.ones(group.count)))).max(initial=0.0)
+        for group in layout.groups
+    ]
+    return float(np.max(worst))
+
+
+def _not_tiny(weights: np.ndarray) -> np.ndarray:
+    return np.maximum(weights, np.mean(weights))[:, None]

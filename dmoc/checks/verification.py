@@ -1,0 +1,250 @@
+"""The checks of a solution: one number, unit and limit each, none of them taken on Ipopt's word."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import of_kind
+from dmoc.checks.evidence import ROUNDING, Case
+from dmoc.checks.limits import excesses
+from dmoc.checks.optimality import stationarity
+from dmoc.motion.dynamics import specific_lagrangian, state_symbols
+from dmoc.motion.march import node_masses, rollout
+from dmoc.motion.reference import reference
+from dmoc.motion.stability import growth_along
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+
+# What each check allows; the reasons stand where they are used.
+RESIDUAL = 1e-6
+ROLLOUT, ROLLOUT_MOST = 1e-8, 1e-3
+REFERENCE = 1e-2
+LEDGER = 1e-8
+OPTIMALITY = 1e-5
+
+
+@dataclass(frozen=True)
+class Check:
+    """One verdict. `value` and `limit` are None where the check does not apply; `note` says why."""
+
+    name: str
+    value: float | None
+    limit: float | None
+    unit: str
+    ok: bool
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The checks of one solution: residual, rollout, reference, ledger, bounds, optimality, stability."""
+
+    checks: tuple[Check, ...]
+    seconds: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether every check holds."""
+        return all(check.ok for check in self.checks)
+
+    def __getitem__(self, name: str) -> Check:
+        return next(check for check in self.checks if check.name == name)
+
+
+def verify(solution: Solution, problem: TransferProblem | None = None) -> Report:
+    """Check a solution: nothing here uses what the optimiser said of it.
+
+    Parameters
+    ----------
+    solution : Solution
+    problem : TransferProblem, optional
+        The problem it answers, if it is not the solution's own.
+
+    Returns
+    -------
+    Report
+        residual : largest defect of the discrete Euler-Lagrange equations, as a force [N];
+        rollout : the same scheme marched forward from the start, against the path, as a fraction of
+        its extent and of its peak speed; reference : the same at the goal for an independent
+        integrator of the equations of motion (DOP853); ledger : change of momentum against impulse,
+        of mass against propellant, of energy against work, and whether the velocities and forces
+        reported are those of the path; bounds : the worst excess over a limit and the worst miss of a
+        boundary condition, at the nodes and between them; optimality : the first-order conditions
+        with the solution's multipliers (for least effort lambda = -m F where no limit of the force
+        acts), and whether the objective is what the path costs; stability : growth of the one-step
+        matrix over that of the exact flow. A number that is not finite fails.
+
+    Raises
+    ------
+    ValueError
+        If the solution has no problem and none is given, or one that does not fit it.
+    """
+    of_kind("solution", solution, Solution)
+    if problem is not None:
+        solution = solution.attach(problem)
+    begun = time.perf_counter()
+    with np.errstate(all="ignore"):
+        case = Case(solution)
+        undefined = case.undefined()
+        checks = tuple(
+            Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
+            if undefined
+            else check(case)
+            for name, check in CHECKS.items()
+        )
+    return Report(checks, time.perf_counter() - begun)
+
+
+def _check(name: str, value: float, limit: float, unit: str, note: str) -> Check:
+    """A verdict that a value which is not a number never passes."""
+    return Check(name, float(value), float(limit), unit, bool(value <= limit), note)
+
+
+def _residual(case: Case) -> Check:
+    """Row k of the discrete Euler-Lagrange equations is a momentum; over the node's weight, a force.
+
+    In units of length the same row would be h^2 / m times smaller and hide what it is to show.
+    """
+    rows = np.zeros_like(case.position)
+    np.add.at(rows, case.at, case.momenta)
+    rows[0] += case.boundary_momentum(0)
+    rows[-1] -= case.boundary_momentum(-1)
+    defect = np.abs(rows) * (case.mass / case.weights)[:, None]
+    node, axis = np.unravel_index(np.argmax(defect), defect.shape)
+    scene = np.max(
+        [case.mass.max() * np.abs(case.pulls).max(), case.mass.max() * case.speed / case.path.duration]
+    )
+    scale = np.max([case.problem.actuator.force_limit() or 0.0, case.largest, 1e-3 * scene])
+    # positions are known to a rounding error of their size: no row can be better than that over h^2
+    floor = case.mass.max() * case.rounding / case.shortest**2
+    note = f"at dynamics[{node}].{'xyz'[axis]}"
+    return _check("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
+
+
+def _rollout(case: Case) -> Check:
+    """March the scheme from the start; what the transfer itself amplifies is not held against the path."""
+    begin, n = case.boundary_momentum(0), case.problem.dimension
+    q, p = rollout(case.dynamics, case.path, case.begin, case.position[0], begin)
+    miss, slip = np.abs(q - case.position[case.ends]).max(), np.abs(p - case.momentum).max()
+    scale = np.repeat([case.extent, case.speed], n)
+    growth = _amplification(case.matrices * scale / scale[:, None])
+    turned = ROUNDING * case.acceleration * case.path.duration
+    floor = case.rounding / case.extent + (case.rounding / case.shortest + turned) / case.speed
+    limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
+    note = f"{miss:.2g} m, {slip:.2g} m/s; path amplifies errors {growth:.2g} times"
+    return _check("rollout", np.max([miss / case.extent, slip / case.speed]), limit, "of the path", note)
+
+
+def _amplification(matrices: np.ndarray) -> float:
+    """How much a small error can grow, at most, from the start to any step or from any step to the goal."""
+    since_start = np.empty_like(matrices)
+    product = np.eye(matrices.shape[1])
+    for k, matrix in enumerate(matrices):
+        product = since_start[k] = matrix @ product
+    try:
+        to_goal = product @ np.linalg.inv(since_start)
+    except np.linalg.LinAlgError:
+        to_goal = since_start
+    sizes = np.sqrt(np.square([since_start, to_goal]).sum(axis=(2, 3)))
+    return float(np.nan_to_num(sizes.max(), nan=np.inf))
+
+
+def _reference(case: Case) -> Check:
+    """The equations of motion, integrated without the scheme, meet the goal."""
+    q, v = reference(case.dynamics, case.path, case.begin, case.path.start_velocity)
+    miss, slip = np.linalg.norm(q - case.position[-1]), np.linalg.norm(v - case.path.goal_velocity)
+    note = f"misses the goal by {miss:.2g} m and {slip:.2g} m/s"
+    return _check(
+        "reference", np.max([miss / case.extent, slip / case.speed]), _accuracy(case), "of the path", note
+    )
+
+
+def _accuracy(case: Case) -> float:
+    """What the error of the discretisation may be: ten times the tolerance if there is one."""
+    return REFERENCE if case.solution.tolerance is None else 10 * case.solution.tolerance
+
+
+def _ledger(case: Case) -> Check:
+    """Momentum and mass: discrete sums, exact. Energy: the work is a quadrature, of the scheme's order.
+
+    And the velocities, momenta and forces that the solution reports are those of its path.
+    """
+    impulse = case.momenta.sum(axis=0)
+    change = case.boundary_momentum(-1) - case.boundary_momentum(0)
+    gross = np.abs(impulse).sum() + case.speed
+    momentum = np.abs(change - impulse.sum(axis=0)).max() / gross
+    masses = node_masses(case.dynamics, case.path, case.problem.mass)
+    mass = np.abs(case.mass - masses).max() / case.problem.mass
+    exact = LEDGER + ROUNDING * case.acceleration * case.path.duration / gross
+    value = np.max([momentum, mass, case.misreported()])
+    note, accuracy, energy = "energy is not kept here", _accuracy(case), _energy_gap(case)
+    if energy is not None:
+        note = f"energy to {energy:.1e} of {accuracy:g}"
+    if case.mass.min() < case.mass.max():
+        note += f", mass to {mass:.1e}"
+    if energy is not None and not energy <= accuracy:
+        return _check("ledger", energy, accuracy, "of the energy", note)
+    return _check("ledger", value, exact, "of the impulse", note)
+
+
+def _energy_gap(case: Case) -> float | None:
+    """Change of energy against work, over the largest of kinetic energy and total work; None if not kept."""
+    t, q, v, m = state_symbols(case.problem.dimension)
+    potential = ca.SX(specific_lagrangian(case.problem.effects, t, q, v, m))
+    if ca.depends_on(potential, t) or (case.dynamics.actuator.burns and ca.depends_on(potential, m)):
+        return None
+    at = [(case.time[i], case.position[i], case.velocity[i], case.mass[i]) for i in (0, -1)]
+    change = float(case.dynamics.energy(*at[1])) - float(case.dynamics.energy(*at[0]))
+    push = case.point[1]
+    if not case.path.hold:
+        parts = np.sum((case.force / case.mass[:, None] + push) * case.node_velocity, axis=1) * case.weights
+    else:
+        moves, middle = np.diff(case.position[case.ends], axis=0), case.mass[case.at].mean(axis=0)
+        work = np.sum(case.force * moves, axis=1) / middle
+        parts = np.concatenate([work, np.sum(push * case.node_velocity, axis=1) * case.weights])
+    return float(abs(change - parts.sum()) / max(0.5 * case.speed**2, np.abs(parts).sum()))
+
+
+def _bounds(case: Case) -> Check:
+    """The limit that is broken most against what it is allowed."""
+    worst = max(excesses(case), key=lambda limit: limit.share)
+    note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
+    shortest, longest = case.problem.duration_bounds
+    below, above = case.path.duration - shortest, longest - case.path.duration
+    if case.problem.free_duration and min(below, above) < 1e-6 * longest:
+        bound = "shortest" if below < above else "longest"
+        note += f"; the duration sits on its {bound} limit of {case.path.duration:g} s"
+    return _check("bounds", worst.value, worst.allowed, worst.unit, note)
+
+
+def _optimality(case: Case) -> Check:
+    """First-order conditions: for least effort lambda = -m F, but for what limits of the force add to it."""
+    left = stationarity(case)
+    note = (
+        f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "
+        f"objective {left.objective:.0e}"
+    )
+    return _check("optimality", left.largest, OPTIMALITY, "-", note)
+
+
+def _stability(case: Case) -> Check:
+    """Spectral radius of each one-step matrix over that of the exact flow, both frozen at the step."""
+    growth = growth_along(case.dynamics, case.path, case.begin, case.velocity, case.matrices)
+    note = f"h omega = {growth.frequency:.2g} at most"
+    return _check("stability", growth.value, growth.limit, "growth a step", note)
+
+
+CHECKS: dict[str, Callable[[Case], Check]] = {
+    "residual": _residual,
+    "rollout": _rollout,
+    "reference": _reference,
+    "ledger": _ledger,
+    "bounds": _bounds,
+    "optimality": _optimality,
+    "stability": _stability,
+}

@@ -1,0 +1,5 @@
+"""python -m dmoc.cli"""
+
+from dmoc.cli.app import main
+
+main()

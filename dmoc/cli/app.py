@@ -1,0 +1,302 @@
+"""The command line: one small function a verb."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from dmoc.cli import stability as stability_command
+from dmoc.cli import study as study_command
+from dmoc.cli import sweep as sweep_command
+from dmoc.cli.options import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NOT_SOLVED,
+    SAVED,
+    SOLVED,
+    File,
+    Hold,
+    Json,
+    Name,
+    Order,
+    Quiet,
+    Settings,
+    Source,
+    Steps,
+    Version,
+    attached,
+    best_start,
+    draw_solution,
+    ends_at_once,
+    fail,
+    problem_of,
+    show_answer,
+    switch,
+    watched,
+    writable,
+)
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+# Typer exports only one of its usage errors; this is the class of all of them.
+USAGE_ERROR: Any = typer.BadParameter.__base__
+
+app = typer.Typer(
+    pretty_exceptions_enable=False,
+    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
+    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed, 130 interrupted.",
+)
+
+
+@app.callback()
+def options(version: Version = False) -> None:
+    """What goes before a verb."""
+
+
+@app.command("list", epilog="Example: dmoc list")
+def list_problems() -> None:
+    """List the problem files, those in ./problems first."""
+    from dmoc.reports import words as report
+    from dmoc.scene import problem_file as library
+
+    found = library.catalogue()
+    if not found:
+        raise ValueError(f"no problem files in {' or '.join(map(str, library.folders()))}")
+    report.console().print(report.pairs(found))
+
+
+@app.command(epilog="Example: dmoc show free_flyer")
+def show(problem: Name, settings: Settings = None) -> None:
+    """Say what a problem is: the scene, its parameters, the size of its NLP."""
+    from dmoc.nlp.transcription import transcribe
+    from dmoc.reports import words as report
+    from dmoc.solver.solve import DEFAULT_STEPS
+
+    file, case = problem_of(problem, settings)
+    nlp = transcribe(case, DEFAULT_STEPS[2])
+    console = report.console()
+    tables = (report.scene(case), report.parameters(file.parameters), report.sizes(nlp))
+    for part in (report.prose(file.docstring), *tables):
+        console.print(part, "", sep="\n")
+    console.print(f"{file.path}; solve it with: dmoc solve {problem}")
+
+
+@app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")
+def solve(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    tol: Annotated[
+        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
+    ] = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
+    starts: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
+        ),
+    ] = 1,
+    as_json: Json = False,
+    compiled: Annotated[
+        bool,
+        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve a problem, check the answer, show both."""
+    import dmoc
+
+    writable(out)
+    writable(plot, drawn=True)
+    # what a problem file prints must not come between the lines of the JSON object
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+        file, case = problem_of(problem, settings)
+        start: Any = None if guess is None else dmoc.load(guess)
+        unit = case.objective.unit_with(case.actuator)
+        if starts > 1:
+            start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
+        with watched(as_json or quiet, unit) as progress:
+            numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold, "compiled": compiled}
+            solution = dmoc.solve(case, guess=start, progress=progress, **numerics)
+        from dmoc.checks.verification import verify
+
+        verdict = verify(solution) if solution.success else None
+    if out is not None:
+        solution.save(out, source_hash=file.source_hash)
+    if plot is not None:
+        from dmoc.plots.page import save_figure
+
+        save_figure(solution, plot, verdict)
+    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
+
+
+@app.command(epilog="Example: dmoc effects leo_raise --all")
+def effects(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    others: Annotated[
+        bool, switch("--all", help="Also effects of the library that are not in the scene.")
+    ] = False,
+) -> None:
+    """Solve a problem and show what each effect does to the path and what it costs."""
+    import dmoc
+    from dmoc.reports import words as report
+    from dmoc.reports.tables import influence_table
+    from dmoc.studies.effects import influences
+
+    _, case = problem_of(problem, settings)
+    solution = dmoc.solve(case, order=order, steps=steps, hold=hold)
+    if not solution.success:
+        show_answer(solution, None, as_json=False)
+    report.console().print(influence_table(influences(solution, others), solution))
+
+
+@app.command("simulate", epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
+def march(
+    problem: Name,
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    controls: Annotated[
+        Path | None, typer.Option(help="A saved solution whose controls to apply; none: coast.")
+    ] = None,
+) -> None:
+    """March the integrator forward from the start, without optimisation."""
+    import dmoc
+    from dmoc.motion.march import simulate
+    from dmoc.nlp.transcription import check_mesh
+    from dmoc.reports import words as report
+
+    if steps is not None:
+        check_mesh(steps)
+    if controls is not None and (order, steps, hold) != (None, None, False):
+        raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
+    _, case = problem_of(problem, settings)
+    known = None if controls is None else dmoc.load(controls).attach(case)
+    with ends_at_once():
+        trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
+    report.console().print(report.motion(trajectory, case, coast=known is None))
+
+
+@app.command(epilog="Example: dmoc check flight.nc")
+def check(file: File, problem: Source = None, as_json: Json = False) -> None:
+    """Check a saved solution again, against its problem file."""
+    from dmoc.checks.verification import verify
+
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+        solution = attached(file, problem)
+        verdict = verify(solution)
+    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
+
+
+@app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
+def plot(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
+    out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
+    problem: Source = None,
+) -> None:
+    """Draw a saved solution, or the result of a sweep."""
+    from dmoc.reports import words as report
+    from dmoc.sweeps import data as sweep_data
+
+    target = file.with_suffix(".png") if out is None else out
+    writable(target, drawn=True)
+    if sweep_data.is_sweep(file):
+        from dmoc.plots.sweep import save_sweep
+
+        save_sweep(sweep_data.read(file), target)
+    else:
+        draw_solution(file, target, problem)
+    report.console().print(f"wrote {target}")
+
+
+@app.command("export", epilog="Example: dmoc export free_flyer planner --steps 40 --hold")
+def take_away(
+    problem: Name,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder, or one of an earlier export.")],
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    no_c: Annotated[bool, switch("--no-c", help="Leave out the C code.")] = False,
+) -> None:
+    """Write integrator, residual and solver of a problem as CasADi files and C code.
+
+    They need CasADi alone, the C code nothing. A .casadi file is code: load only those you trust.
+    """
+    import json
+
+    import dmoc
+    from dmoc.reports import words as report
+
+    _, case = problem_of(problem, settings)
+    paths = dmoc.export(case, folder, 2 if order is None else order, steps, hold, c=not no_c)
+    functions = json.loads(paths[0].read_text())["functions"]
+    console = report.console()
+    console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
+    console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
+
+
+@app.command(epilog="Example: dmoc doctor")
+def doctor() -> None:
+    """Say what this computer has: versions, linear solvers, a C compiler, cores, and how fast it solves."""
+    from dmoc.reports import words as report
+    from dmoc.reports.tables import findings_table
+    from dmoc.studies.computer import examine
+
+    report.console().print(findings_table(examine()))
+
+
+app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
+    sweep_command.sweep
+)
+
+
+app.command(
+    "study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"
+)(study_command.study)
+
+
+app.command("stability", epilog="Example: dmoc stability --revolutions 1000 --plot stability.png")(
+    stability_command.stability
+)
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line; every bad input becomes one line on stderr and exit code 2."""
+    from dmoc.scene.problem_file import users_line
+
+    given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    try:
+        code = app(args=given, standalone_mode=False) or SOLVED
+    except USAGE_ERROR as error:
+        verb = f"{error.ctx.info_name} " if error.ctx and error.ctx.parent else ""
+        fail(f"error: {error.format_message()} (dmoc {verb}--help)", BAD_INPUT)
+    except (ValueError, OSError) as error:
+        fail(f"error: {error}{users_line(error)}", BAD_INPUT)
+    except Exception as error:
+        place = users_line(error)
+        if not place:
+            raise
+        fail(f"error: {type(error).__name__}: {error}{place}", BAD_INPUT)
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        fail("interrupted", INTERRUPTED)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,227 @@
+"""What the commands share: options, the way to a problem and to its answer, and what Ctrl-C does."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+if TYPE_CHECKING:
+    from dmoc.checks.verification import Report
+    from dmoc.results.solution import Solution
+    from dmoc.scene.problem_file import ProblemFile
+
+# A switch takes no value, so the help shows none beside it.
+switch = partial(typer.Option, metavar="")
+
+SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+
+
+def names_like(begun: str) -> list[str]:
+    """Names of problem files, for the completion of a shell."""
+    from dmoc.scene.problem_file import catalogue
+
+    return [name for name, _ in catalogue() if name.startswith(begun)]
+
+
+def say_version(wanted: bool) -> None:
+    if wanted:
+        from dmoc import __version__
+
+        print(f"dmoc {__version__}")
+        raise typer.Exit
+
+
+Name = Annotated[
+    str,
+    typer.Argument(
+        metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
+    ),
+]
+SAVED = "A solution saved with `dmoc solve --out`"
+File = Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}.")]
+Source = Annotated[
+    str | None,
+    typer.Option("--problem", metavar="PROBLEM", help="The problem, if not the one named in the file."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
+]
+Order = Annotated[
+    int | None,
+    typer.Option(help="2, 4, 6 or 8; if not given 2, in a solve around an attractor what that needs."),
+]
+Steps = Annotated[
+    int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
+]
+Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
+Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
+Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]
+
+
+def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]:
+    """The problem file, and the problem made with the values of --set."""
+    from dmoc.scene.problem_file import load_problem, parse_settings
+
+    values = parse_settings(settings or ())
+    file = load_problem(name)
+    return file, file.make(**values)
+
+
+def best_start(case: Any, starts: int, order: int | None, hold: bool, guess: Any, unit: str | None) -> Any:
+    """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
+    from dmoc.reports import words as report
+    from dmoc.reports.tables import optima_table
+    from dmoc.solver.starts import local_optima
+
+    found = local_optima(case, starts, order, hold, guess)
+    if unit is not None:
+        report.console().print(optima_table(found, unit))
+    return found[0].path if found else guess
+
+
+def watched(quiet: bool, unit: str) -> AbstractContextManager[Callable | None]:
+    """What a solve is to tell of its progress, with the line of the terminal that shows it."""
+    if quiet:
+        return nullcontext()
+    from dmoc.reports.words import live_line
+
+    return live_line(unit)
+
+
+def attached(path: Path, source: str | None) -> Solution:
+    """A saved solution with its problem: the one given, else the one it names.
+
+    The name in a file is only ever looked up in the problem folders: a file must not choose what is run.
+    """
+    import dmoc
+    from dmoc.scene.problem_file import has_problem, load_problem
+
+    solution = dmoc.load(path)
+    known = solution.provenance
+    if source is None and not (known.problem_name.isidentifier() and has_problem(known.problem_name)):
+        raise ValueError(
+            f"{path} was made from {known.problem_name!r}, of which there is no problem file; "
+            "give it with --problem PATH"
+        )
+    file = load_problem(source or known.problem_name)
+    attached = solution.attach(file.make(**known.parameters))
+    # what was saved from Python does not say which file it was made from
+    if known.source_hash and known.source_hash != file.source_hash:
+        warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
+    return attached
+
+
+def draw_solution(file: Path, target: Path, problem: str | None) -> None:
+    """Draw a saved solution; without its problem, what the file itself has."""
+    import dmoc
+    from dmoc.plots.page import save_figure
+
+    try:
+        solution = attached(file, problem)
+    except ValueError as error:
+        solution = dmoc.load(file)
+        if problem is not None:
+            raise
+        warn(f"zones and limits are left out: {error}")
+    save_figure(solution, target)
+
+
+def show_answer(
+    solution: Solution,
+    verdict: Report | None,
+    as_json: bool,
+    quiet: bool = False,
+    written: Sequence[Path] = (),
+    stopped: int = INTERRUPTED,
+) -> None:
+    """Print the answer and exit with the code that says what it is worth."""
+    if as_json:
+        from dmoc.reports import as_json as report_json
+
+        print(report_json.as_text(report_json.result(solution, verdict)))
+    else:
+        from dmoc.reports import words as report
+
+        if solution.success and verdict is not None:
+            report.console().print(report.answer(solution, verdict, quiet, written))
+        else:
+            report.console().print(report.failure(solution, quiet, written))
+    if not solution.success:
+        raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
+    raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
+
+
+def warn(message: str) -> None:
+    print(f"warning: {' '.join(message.split())}", file=sys.stderr)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
+
+
+def writable(path: Path | None, drawn: bool = False, table: bool = False) -> None:
+    """ValueError unless a file can be written there: said before the work, not after it.
+
+    A result takes the place of another one, never that of a problem file or a thesis.
+    """
+    if path is None:
+        return
+    from dmoc.basics.files import path_of
+
+    folder = path_of(path).parent
+    if not folder.is_dir():
+        raise ValueError(f"cannot write {path}: there is no folder {folder}; create it first")
+    special = path.exists() and not path.is_file()
+    if special or not os.access(folder, os.W_OK):
+        raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
+    if drawn:
+        from dmoc.plots.page import SUFFIXES
+
+        if path.suffix.lower() not in SUFFIXES:
+            raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+    elif table:
+        if path.suffix.lower() != ".csv":
+            raise ValueError(f"cannot write a table into {path}: the file must end in .csv")
+    elif path.exists() and path.stat().st_size:
+        from dmoc.results.netcdf import HDF5_SIGNATURE
+
+        with path.open("rb") as stream:
+            if stream.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
+                raise ValueError(
+                    f"cannot write {path}: it is no result that may be replaced; give another name"
+                )
+
+
+@contextmanager
+def ends_at_once() -> Iterator[None]:
+    """Outside a solve, which stops at Ctrl-C and keeps its iterate, it ends the program.
+
+    CasADi would swallow the exception. Nothing is being written here, so nothing is left behind.
+    """
+
+    def end(number: int, frame: Any) -> NoReturn:
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[2K\x1b[?25h")
+        sys.stderr.write("interrupted\n")
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
+
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,142 @@
+"""`dmoc stability`: long runs, rounding, and steps at the edge of stability."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dmoc.cli.options import Json, ends_at_once, writable
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+
+def stability(
+    revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
+    eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
+    steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
+    plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure numerical stability: drift over many revolutions, rounding, the longest stable steps.
+
+    Coasts Kepler orbits by the schemes of order 2 to 8, by RK4 and by DOP853.
+    """
+    from dmoc.reports import words as report
+    from dmoc.studies.drift import drift, kepler, per_revolution
+    from dmoc.studies.rounding import growth, round_off
+
+    writable(plot, drawn=True)
+    orbits = [(kepler(value), per_revolution(value)) for value in _numbers(eccentricity)]
+    live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
+        rounding = round_off(steps)
+        edges = growth()
+        runs = [(case.name, drift(case, revolutions, methods)) for case, methods in orbits]
+    if plot is not None:
+        from dmoc.plots.stability import stability_figure
+        from dmoc.plots.study import save_page
+
+        save_page(stability_figure(runs, rounding, edges), plot)
+    if as_json:
+        from dmoc.reports.as_json import as_text
+
+        print(as_text(_object(runs, rounding, edges)))
+        return
+    console = report.console()
+    for part in _tables(runs, rounding, edges):
+        console.print(part)
+    if plot is not None:
+        console.print(f"wrote {plot}")
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"--eccentricity must be numbers with commas, such as 0.3,0.7; got {text!r}") from None
+
+
+def _object(runs: list, rounding: list, edges: list) -> dict[str, Any]:
+    """The JSON object; numbers that are not finite become null."""
+    import math
+
+    figures = ("method", "steps", "revolutions", "energy_error", "momentum_error", "growth", "seconds")
+
+    def plain(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return {
+        "drift": [
+            {"orbit": orbit} | {name: plain(getattr(row, name)) for name in figures}
+            for orbit, rows in runs
+            for row in rows
+        ],
+        "round_off": [
+            {
+                "form": row.form,
+                "steps": int(row.steps[-1]),
+                "momentum_error": float(row.momentum_error[-1]),
+                "miss": row.miss,
+            }
+            for row in rounding
+        ],
+        "unstable": [
+            {"method": row.method, "from": low, "to": high, "growth": most}
+            for row in edges
+            for low, high, most in row.gaps
+        ],
+    }
+
+
+def _tables(runs: list, rounding: list, edges: list) -> list[RenderableType]:
+    from rich.text import Text
+
+    parts: list[RenderableType] = []
+    for orbit, rows in runs:
+        parts += [Text(f"Kepler orbit, {orbit}, {rows[0].revolutions:g} revolutions", "bold"), _drift(rows), ""]
+    words = "largest errors, relative; growth: energy error of the last tenth over that of the first"
+    parts += [Text(f"{words}, 1 where it stays bounded", "dim"), ""]
+    steps = int(rounding[0].steps[-1])
+    parts.append(Text(f"Rounding: equation (16) marched {steps:,} steps along a circle", "bold"))
+    table = _table("form", "angular momentum", "place against compensated [radii]")
+    for row in rounding:
+        table.add_row(row.form, f"{row.momentum_error[-1]:.1e}", f"{row.miss:.1e}")
+    parts += [table, "", Text("Longest stable steps: h times the rate of an oscillation", "bold")]
+    table = _table("method", "stable up to", "then grows a step by up to", "loses a step at 1")
+    for row in edges:
+        low, high, most = row.gaps[0]
+        until = f"{most:.4g} (until {high:.3f})" if high < row.reach[-1] else f"{most:.4g}"
+        lost = 1 - float(row.growth[row.reach.searchsorted(1.0)])
+        table.add_row(row.method, f"{low:.3f}", until, f"{lost:.1e}" if lost > 1e-12 else "nothing")
+    return [*parts, table]
+
+
+def _drift(rows: list) -> Table:
+    table = _table("method", "steps/rev", "us/rev", "energy", "angular momentum", "growth")
+    for row in rows:
+        table.add_row(
+            row.method,
+            f"{row.steps:.0f}",
+            f"{1e6 * row.seconds:.0f}",
+            f"{row.energy_error:.1e}",
+            f"{row.momentum_error:.1e}",
+            f"{row.growth:.2g}",
+        )
+    return table
+
+
+def _table(*columns: str) -> Table:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i else "left")
+    return table

@@ -1,0 +1,90 @@
+"""`dmoc study`: what accuracy costs in time."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext, redirect_stdout
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, writable
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+
+def study(
+    problem: Name,
+    orders: Annotated[str, typer.Option(metavar="N,N,...", help="Of 2, 4, 6, 8.")] = "2,4,6,8",
+    steps: Annotated[
+        str | None, typer.Option(metavar="N,N,...", help="Numbers of steps; if not given, some for each order.")
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
+    ] = None,
+    cold: Annotated[bool, switch("--cold", help="Also without coarse meshes on the way.")] = False,
+    compiled: Annotated[
+        bool, switch("--compiled", help="Also with functions as machine code, once they are compiled.")
+    ] = False,
+    repeats: Annotated[
+        int,
+        typer.Option(metavar="N", min=1, max=1000, help="How often each solve is timed; the median counts."),
+    ] = 3,
+    reference: Annotated[
+        float | None, typer.Option(help="The true objective; order 8 on a fine mesh if not given.")
+    ] = None,
+    settings: Settings = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw error against time here (png, pdf or svg).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write a line a solve here.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure what accuracy costs in time, for every order on several meshes and for other methods.
+
+    Medians of several runs; whatever else the computer does makes them longer.
+    """
+    from dmoc.plots.study import save_study
+    from dmoc.reports import study as report_study
+    from dmoc.reports import words as report
+    from dmoc.scene.problem_file import load_problem, parse_settings
+    from dmoc.studies.accuracy import work_precision
+    from dmoc.studies.other_methods import load_methods
+
+    writable(plot, drawn=True)
+    writable(csv, table=True)
+    chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
+    live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
+        case = load_problem(problem).make(**parse_settings(settings or ()))
+        methods = {} if against is None else load_methods(against)
+        told = live.update if live else None
+        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold, compiled, told)
+    if plot is not None:
+        save_study(trials, plot, f"{case.name.replace('_', ' ')}: what accuracy costs in time")
+    if csv is not None:
+        report_study.write_csv(trials, csv)
+    if as_json:
+        from dmoc.reports.as_json import as_text
+
+        print(as_text(report_study.study_object(case.name, trials)))
+        return
+    console = report.console()
+    unit = case.objective.unit_with(case.actuator)
+    console.print(report_study.study_tables(trials, unit, console.width))
+    for path in filter(None, (plot, csv)):
+        console.print(f"wrote {path}")
+
+
+def whole_numbers(name: str, text: str) -> list[int]:
+    """The numbers in a text such as `2,4,6`.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"--{name} must be whole numbers with commas, such as 2,4,8; got {text!r}") from None

@@ -1,0 +1,260 @@
+"""Take the functions of a problem elsewhere: CasADi files, C code, and a manifest that says what is what."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc import __version__
+from dmoc.basics.arguments import flag, of_kind
+from dmoc.basics.files import path_of
+from dmoc.exports import functions as export_functions
+from dmoc.exports import planner as export_solver
+from dmoc.exports import residual as export_residual
+from dmoc.exports.code import write_code
+from dmoc.exports.functions import Exported
+from dmoc.exports.planner import Planner
+from dmoc.motion.lobatto import scheme
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.solve import DEFAULT_STEPS
+
+FORMAT = "dmoc export"
+FORMAT_VERSION = 1
+
+
+def export(
+    problem: TransferProblem,
+    folder: str | os.PathLike,
+    order: int = 2,
+    steps: int | None = None,
+    hold: bool = False,
+    c: bool = True,
+    guess: Any = None,
+    options: dict[str, Any] | None = None,
+) -> list[Path]:
+    """Write the functions of a problem to a folder: all arguments named and in SI units.
+
+    `step` (the one-step map), `rollout` (all steps), `residual` (the discrete Euler-Lagrange equations of a
+    path [N]), `residual_jacobian`, `cost`, `solver` and `warm_solver` (Ipopt with states, mass, limits, times
+    and a guess as inputs) and `nominal` (the problem's own inputs of the solver) become `.casadi` files that
+    CasADi alone loads, in Python, C++, MATLAB or Octave; step, rollout and residual become C code too.
+    `manifest.json` has shape, unit and meaning of every argument and the checksum of every file.
+
+    An `nlpsol` has no status output. The solver's outputs `largest_residual` [N] and `violation` [-] say
+    whether a plan can be flown; whether it is an optimum, `solver.stats()["return_status"]` says, also after
+    loading. Where it fails, `residual` [N] and `violations_...` [-] say: the defect at every node, and each
+    bound and row in the shape of its multipliers.
+
+    A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
+    you trust where it comes from. dmoc itself never loads one.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+    folder : path
+        Made by this call; if it is there, it must be empty or hold an earlier export and nothing else.
+        It is written whole or not at all.
+    order : int
+        2, 4, 6 or 8.
+    steps : int, optional
+        Equal steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8 if not given.
+    hold : bool
+        Forces constant over each step.
+    c : bool
+        Whether to write C code.
+    guess : optional
+        Where the solver starts from, as in `solve`. A Solution is best: `nominal` then holds a plan that
+        `warm_solver` can go on from at once. The exported solver has one mesh, no ladder of coarser ones.
+    options : dict, optional
+        CasADi `nlpsol` options of both solvers, for example {"ipopt.max_wall_time": 0.5}.
+
+    Returns
+    -------
+    list of Path
+        The files, the manifest first.
+
+    Raises
+    ------
+    ValueError
+        If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
+    """
+    steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
+    of_kind("problem", problem, TransferProblem)
+    hold, c = flag("hold", hold), flag("c", c)
+    target = _checked_folder(path_of(folder))
+    planner = Planner.of(problem, order, steps, hold, guess)
+    functions = functions_of(planner, options)
+    with _whole_folder(target) as work:
+        for exported in functions:
+            _save(exported.function, work / f"{exported.function.name()}.casadi")
+        if c:
+            (work / "c").mkdir()
+            write_code(planner, functions[:3], work / "c")
+        (work / "README.md").write_text(README.format(name=problem.name, code=CODE if c else ""))
+        files = sorted(path.relative_to(work) for path in work.rglob("*") if path.is_file())
+        sums = {file.as_posix(): hashlib.sha256((work / file).read_bytes()).hexdigest() for file in files}
+        manifest = json.dumps(_manifest(planner, functions, c, sums), indent=1, default=_plain)
+        (work / "manifest.json").write_text(manifest + "\n")
+    return [target / "manifest.json", *(target / file for file in files)]
+
+
+def functions_of(planner: Planner, options: dict[str, Any] | None = None) -> list[Exported]:
+    """All functions of an export; the first three can become C code."""
+    scene = planner.scene
+    return [
+        export_functions.step(scene),
+        export_functions.rollout(scene),
+        export_residual.residual(scene),
+        export_residual.residual_jacobian(scene),
+        export_solver.cost(planner),
+        export_solver.solver(planner, options, warm=False),
+        export_solver.solver(planner, options, warm=True),
+        export_solver.nominal(planner),
+    ]
+
+
+def _save(function: ca.Function, file: Path) -> None:
+    """What `Function.save` writes: that one does not say when the disk is full."""
+    content = ca.StringSerializer()
+    content.pack(function)
+    file.write_bytes(content.encode().encode())
+
+
+def _manifest(planner: Planner, functions: list[Exported], c: bool, sums: dict[str, str]) -> dict[str, Any]:
+    scene, problem = planner.scene, planner.scene.problem
+    coded = {exported.function.name() for exported in functions[:3] if c}
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "problem": {"name": problem.name, "parameters": problem.parameters},
+        "scheme": {"order": scene.rule.order, "steps": scene.steps, "hold": scene.hold, "nodes": scene.nodes},
+        "controls": list(problem.actuator.labels(scene.axes)),
+        "versions": {
+            "dmoc": __version__,
+            "casadi": ca.__version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+        "functions": {
+            exported.function.name(): _entry(exported, exported.function.name() in coded)
+            for exported in functions
+        },
+        "files": sums,
+    }
+
+
+def _entry(exported: Exported, coded: bool) -> dict[str, Any]:
+    f = exported.function
+    places = {
+        "inputs": [(f.name_in(i), f.size_in(i)) for i in range(f.n_in())],
+        "outputs": [(f.name_out(i), f.size_out(i)) for i in range(f.n_out())],
+    }
+    lists = {
+        kind: [{"name": name, "shape": list(shape), **vars(exported.term(name))} for name, shape in found]
+        for kind, found in places.items()
+    }
+    files = {"file": f"{f.name()}.casadi"} | ({"c": "c/functions.c"} if coded else {})
+    return {"words": exported.words, **files, **lists}
+
+
+def _plain(value: Any) -> Any:
+    """What JSON does not know: arrays as lists, everything else as text."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _checked_folder(folder: Path) -> Path:
+    """The folder, or ValueError if an export must not take its place."""
+    target = folder.resolve()
+    if not target.parent.is_dir():
+        raise ValueError(f"cannot export to {folder}: there is no folder {target.parent}; create it first")
+    if not target.exists():
+        return target
+    if not target.is_dir():
+        raise ValueError(f"cannot export to {folder}: it is a file; name a new folder")
+    if target == Path.cwd():
+        raise ValueError(f"cannot export to {folder}: it is the working folder; name a new folder in it")
+    there = {path.relative_to(target).as_posix() for path in target.rglob("*") if not path.is_dir()}
+    foreign = sorted(there - _exported_before(target))
+    if foreign:
+        raise ValueError(
+            f"cannot export to {folder}: it holds files that no earlier export wrote, such as {foreign[0]}; "
+            "name a new folder, or move them"
+        )
+    return target
+
+
+def _exported_before(folder: Path) -> set[str]:
+    """The files an earlier export wrote to a folder."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text())
+        return {"manifest.json", *manifest["files"]} if manifest["format"] == FORMAT else set()
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+
+
+@contextmanager
+def _whole_folder(target: Path) -> Iterator[Path]:
+    """A temporary folder beside `target`, which takes its place once the block has ended without an error."""
+    work = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    old = work.with_name(f"{work.name}.old")
+    try:
+        work.mkdir()
+        yield work
+        if target.exists():
+            os.replace(target, old)
+        try:
+            os.replace(work, target)
+        except BaseException:
+            if old.exists():
+                os.replace(old, target)
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise OSError(f"cannot export to {target}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+README = """\
+# Functions of {name}
+
+`manifest.json` lists every function with shape, unit and meaning of its arguments, and the SHA-256 of every
+file here. All values are in SI units; matrices have one column a node, a step end or a step.
+
+A `.casadi` file is code: CasADi runs what it holds. Load one only if you trust where it comes from.
+
+Python, with CasADi alone:
+
+    import casadi as ca
+    nominal, solver = ca.Function.load("nominal.casadi"), ca.Function.load("solver.casadi")
+    inputs = nominal()                     # the problem's own numbers and its guess, by name
+    inputs["mass"] = 12
+    plan = solver(**inputs)
+    print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
+
+The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
+(of rows and bounds, scaled) are small; that it is an optimum only the status says. Where a plan fails,
+`residual` [N] shows for every node, `violations_...` for every bound and row, shaped like its multipliers.
+
+To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too,
+moved on to the new times. What is no input of the solver is fixed in it.
+
+C++: `casadi::Function::load("solver.casadi")`, called with a `DMDict`. MATLAB and Octave:
+`solver = casadi.Function.load('solver.casadi'); plan = solver.call(nominal.call(struct()))`.
+{code}"""
+
+CODE = """
+C: `c/functions.c` needs nothing but the mathematical library; `c/transfer.h` documents it and `c/main.c` is an
+example: `cc -O2 main.c functions.c -lm -o transfer && ./transfer`.
+"""

@@ -1,0 +1,207 @@
+"""The solver of an NLP as one CasADi function in SI units: states, limits and a warm start in, a plan out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.exports.functions import TERMS, Exported, Scene, Term, named
+from dmoc.exports.numbers import Numbers
+from dmoc.exports.residual import path_symbols, residual_of, velocities_of
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess
+from dmoc.motion.stability import refuse_unstable
+from dmoc.nlp.ipopt import Answer, make_solver, path_of
+from dmoc.nlp.transcription import NLP, check_mesh, transcribe_onto, units_of
+from dmoc.scene.problem import TransferProblem
+
+
+@dataclass(frozen=True)
+class Planner:
+    """An NLP and what its solver needs to speak SI units."""
+
+    scene: Scene
+    nlp: NLP
+    guess: Guess
+
+    @classmethod
+    def of(cls, problem: TransferProblem, order: int, steps: int, hold: bool, guess: Any = None) -> Planner:
+        """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
+        start = starting_guess(problem, check_mesh(steps), order, hold, guess)
+        scene = Scene(problem, scheme(order), steps, hold)
+        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds[0])
+        return cls(scene, transcribe_onto(problem, start, units_of(problem, start)), start)
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        return Numbers(self.nlp)
+
+    @cached_property
+    def multipliers(self) -> dict[str, np.ndarray]:
+        """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
+        columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
+        answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0, 0.0)
+        return self.by_name(path_of(self.nlp, self.scene.problem, answer).multipliers)
+
+    def by_name(self, multipliers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Multipliers of a path under the names they have here, one column an index."""
+        names = {key: _multiplier_name(key, list(multipliers)) for key in multipliers}
+        return {names[key]: value.T for key, value in multipliers.items() if value.size}
+
+    @property
+    def plan_names(self) -> list[str]:
+        """What a plan consists of, beside multipliers."""
+        more = ["masses"] * self.scene.burns + ["duration"] * self.scene.problem.free_duration
+        return ["positions", "velocities", "forces", *more]
+
+    def pack(self, plan: dict[str, Any]) -> ca.MX:
+        """Scaled unknowns."""
+        parts = {
+            "position": lambda: plan["positions"] - ca.DM(self.nlp.units.origin),
+            "force": lambda: plan["forces"],
+            "mass": lambda: plan["masses"],
+            "start.velocity": lambda: plan["velocities"][:, 0],
+            "goal.velocity": lambda: plan["velocities"][:, -1],
+            "duration": lambda: plan["duration"],
+        }
+        values = [ca.vec(parts[group.name]()) for group in self.nlp.columns.groups]
+        return ca.vertcat(*values) / ca.DM(self.nlp.columns.scales())
+
+    def unpack(self, x: ca.MX, numbers: dict[str, ca.MX]) -> dict[str, ca.MX]:
+        """What the residual of a path is made of, from scaled unknowns."""
+        groups = self.nlp.columns.groups
+        pieces = ca.vertsplit(x * ca.DM(self.nlp.columns.scales()), [0, *(group.stop for group in groups)])
+        found = {
+            group.name: ca.reshape(piece, len(group.labels), group.count)
+            for group, piece in zip(groups, pieces, strict=True)
+        }
+        mass = {"masses": found["mass"]} if self.scene.burns else {"mass": numbers["mass"]}
+        return mass | {
+            "positions": found["position"] + ca.DM(self.nlp.units.origin),
+            "start_velocity": found["start.velocity"],
+            "goal_velocity": found["goal.velocity"],
+            "forces": found["force"],
+            "start_time": numbers["start_time"],
+            "duration": found["duration"] if "duration" in found else numbers["duration"],
+        }
+
+
+def _multiplier_name(key: str, keys: list[str]) -> str:
+    """multipliers_goal_speed from end:row:goal.speed; with its kind where two groups have one name."""
+    kind, _, name = key.split(":")
+    twins = [other for other in keys if other.split(":")[2] == name]
+    return f"multipliers_{name.replace('.', '_')}" + (f"_{kind}" if len(twins) > 1 else "")
+
+
+def cost(planner: Planner) -> Exported:
+    """The objective of a path."""
+    path, nlp = path_symbols(planner.scene), planner.nlp
+    ends = ca.horzcat(path["start_velocity"], path["goal_velocity"])
+    given = {name: symbol for name, symbol in planner.numbers.symbols().items() if name not in path} | path
+    _, _, p = planner.numbers.bounds_and_parameters(given)
+    f = nlp.objective(nlp.assembly.objective(planner.pack({**path, "velocities": ends}), p))  # type: ignore[arg-type]
+    whole = named("cost", given, {"cost": f})
+    used = {
+        name: symbol
+        for i, (name, symbol) in enumerate(given.items())
+        if name in path or whole.jac_sparsity(0, i).nnz()
+    }
+    values = [used[name] if name in used else planner.numbers.value(name) for name in given]
+    terms = planner.numbers.terms | {"cost": Term(_unit(planner), "the objective, in its own sign")}
+    return Exported(named("cost", used, {"cost": whole(*values)}), "the objective of a path", terms)
+
+
+def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Exported:
+    """The parametric solver, for a cold or for a warm start."""
+    nlp, scene = planner.nlp, planner.scene
+    numbers, plan = planner.numbers.symbols(), scene.symbols(*planner.plan_names)
+    multipliers = {name: ca.MX.sym(name, *one.shape) for name, one in planner.multipliers.items()}
+    lower, upper, p = planner.numbers.bounds_and_parameters(numbers)
+    _, _, row_lower, row_upper = nlp.bounds(scene.problem)
+    lam = [ca.vec(symbol / ca.DM(planner.multipliers[name])) for name, symbol in multipliers.items()]
+    lam_x, lam_g = ca.vertsplit(ca.vertcat(*lam), [0, nlp.columns.size, nlp.columns.size + nlp.rows.size])
+    bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
+    x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
+    found = make_solver(nlp, options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
+    both = ca.vertcat(found["x"], found["g"])
+    beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
+    outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
+    outputs["violation"] = _largest(beyond, both)
+    guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
+    name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of the positions")
+    function = named(name, numbers | guesses, outputs)
+    return Exported(function, f"Ipopt's solution of the transfer, {words}", _solver_terms(planner))
+
+
+def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX]) -> dict[str, ca.MX]:
+    """What a solve gave, in SI units; the residual is found anew from the path."""
+    path = planner.unpack(found["x"], numbers)
+    path["velocities"] = velocities_of(planner.scene, path)
+    residual = residual_of(planner.scene, path)
+    lam = _by_group(planner, ca.vertcat(found["lam_x"], found["lam_g"]), "multipliers")
+    return {
+        **{name: path[name] for name in planner.plan_names},
+        **{name: value * ca.DM(planner.multipliers[name]) for name, value in lam.items()},
+        "objective": planner.nlp.objective(found["f"]),  # type: ignore[arg-type, dict-item]
+        "residual": residual,
+        "largest_residual": _largest(ca.fabs(ca.vec(residual)), ca.vec(residual)),
+    }
+
+
+def nominal(planner: Planner) -> Exported:
+    """What the problem itself states, and its own guess: inputs of the solver to begin with."""
+    guess, known = planner.guess, planner.by_name(planner.guess.multipliers)
+    ends = np.linspace(guess.start_velocity, guess.goal_velocity, planner.scene.steps + 1)
+    plan: dict[str, Any] = {"positions": guess.position.T, "velocities": ends.T, "forces": guess.control.T}
+    plan |= {"masses": guess.mass[None], "duration": guess.duration}
+    values = {name: planner.numbers.value(name) for name in planner.numbers.names}
+    values |= {f"guess_{name}": ca.DM(plan[name]) for name in planner.plan_names}
+    values |= {f"guess_{name}": known.get(name, 0 * one) for name, one in planner.multipliers.items()}
+    outputs = {name: ca.MX(ca.DM(value)) for name, value in values.items()}
+    words = "the problem's own numbers and its guess, named like the inputs of the solver"
+    return Exported(named("nominal", {}, outputs), words, _solver_terms(planner))
+
+
+def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
+    """A number of every unknown and row as one matrix a group, named like its multipliers."""
+    ones = planner.multipliers
+    pieces = ca.vertsplit(values, np.cumsum([0, *(one.size for one in ones.values())]).tolist())
+    return {
+        name.replace("multipliers", prefix, 1): ca.reshape(piece, *one.shape)
+        for (name, one), piece in zip(ones.items(), pieces, strict=True)
+    }
+
+
+def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
+    """The largest value, at least 0; infinite if what is to be finite is not: a maximum passes over NaN."""
+    return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
+
+
+def _unit(planner: Planner) -> str:
+    problem = planner.scene.problem
+    return problem.objective.unit_with(problem.actuator)
+
+
+def _solver_terms(planner: Planner) -> dict[str, Term]:
+    unit = _unit(planner)
+    terms = {
+        "objective": Term(unit, "the objective, in its own sign"),
+        "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
+        "violation": Term(
+            "-", "largest violation of a row or bound, relative to its scale; infinite if undefined"
+        ),
+        "duration": Term("s", "duration of the transfer"),
+    }
+    for name in planner.multipliers:
+        group = name.removeprefix("multipliers_")
+        words = f"multipliers of {group}, per fraction of the duration where one a node"
+        terms[name] = Term(f"{unit or '1'} per unit of the row", words)
+        terms[f"violations_{group}"] = Term("-", f"how far {group} is beyond its bounds, relative to its scale")
+    plan = {name: terms.get(name) or TERMS[name] for name in (*planner.plan_names, *planner.multipliers)}
+    guesses = {f"guess_{name}": Term(term.unit, f"guess: {term.words}") for name, term in plan.items()}
+    return planner.numbers.terms | terms | guesses

@@ -1,0 +1,99 @@
+"""The discrete Euler-Lagrange equations of a path as CasADi functions of their own."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from dmoc.exports.functions import TERMS, Exported, Scene, Term, named
+from dmoc.motion.momenta import legendre_function
+
+
+def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
+    """P_0 .. P_s [m/s] of every step of a path, one column a step."""
+    h, origin = path["duration"] / scene.steps, path["positions"][:, 0]
+    q = ca.vertcat(*scene.at_nodes(path["positions"] - ca.repmat(origin, 1, scene.nodes)))
+    m = ca.vertcat(*scene.at_nodes(path["masses"])) if scene.burns else ca.MX(0, scene.steps)
+    same = ca.vertcat(h, origin, *([] if scene.burns else [path["mass"]]))
+    times = step_times(scene.steps)(ca.vertcat(0, path["start_time"], h))[1]
+    return list(_momenta_kernel(scene).map(scene.steps)(q, m, scene.split(path["forces"]), times, same))
+
+
+def step_times(steps: int) -> ca.Function:
+    """(0, start time, h) -> times at the start of all steps, counted and not added up."""
+    state = ca.MX.sym("state", 3)
+    given = ca.vertcat(state[0] + 1, state[1:])
+    return ca.Function("count", [state], [given, state[1] + state[0] * state[2]]).mapaccum("times", steps)
+
+
+def _momenta_kernel(scene: Scene) -> ca.Function:
+    """(q, m, u, t, (h, origin, the mass if it is constant)) -> P_0 .. P_s of one step."""
+    n, s = scene.axes, scene.rule.degree
+    q, u, t = ca.MX.sym("q", n * (s + 1)), ca.MX.sym("u", scene.controls * scene.step_columns), ca.MX.sym("t")
+    m, same = ca.MX.sym("m", s + 1 if scene.burns else 0), ca.MX.sym("same", n + (1 if scene.burns else 2))
+    masses = m if scene.burns else ca.repmat(same[-1], s + 1)
+    function = legendre_function(scene.dynamics, scene.rule.order, scene.hold)
+    parts = function(q, masses, u, t, same[0], same[1 : n + 1])
+    return ca.Function("momenta", [q, m, u, t, same], parts).expand()
+
+
+def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
+    """Defect of the discrete Euler-Lagrange equations at every node, as a force [N].
+
+    Each row is a momentum; over the time it acts for and times the mass it is a force.
+    """
+    rule, n = scene.rule, scene.axes
+    q, start_time, duration = path["positions"], path["start_time"], path["duration"]
+    masses = scene.at_nodes(path["masses"]) if scene.burns else [path["mass"]] * (rule.degree + 1)
+    last_mass = path["masses"][-1] if scene.burns else path["mass"]
+    h = duration / scene.steps
+    parts = momenta(scene, path)
+    begin = scene.momentum(start_time, q[:, 0], path["start_velocity"], masses[0][0])
+    finish = scene.momentum(start_time + duration, q[:, -1], path["goal_velocity"], last_mass)
+    arriving = ca.horzcat(begin, parts[-1][:, :-1])
+    weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
+    ends = _times(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
+    ends = ca.horzcat(2 * ends[:, 0], ends[:, 1:])
+    inner = [_times(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
+    rows = ca.reshape(ca.vertcat(ends, *inner), n, scene.nodes - 1) if inner else ends
+    return ca.horzcat(rows, (parts[-1][:, -1] - finish) * last_mass / weight[0])
+
+
+def _times(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
+    return rows * (factor if factor.is_scalar() else ca.repmat(factor, axes, 1))
+
+
+def path_symbols(scene: Scene) -> dict[str, ca.MX]:
+    """Symbols for what the residual of a path is made of."""
+    mass = "masses" if scene.burns else "mass"
+    names = ("positions", "start_velocity", "goal_velocity", "forces", mass, "start_time", "duration")
+    return scene.symbols(*names)
+
+
+def residual(scene: Scene) -> Exported:
+    """The discrete Euler-Lagrange equations of a path."""
+    path = path_symbols(scene)
+    words = "discrete Euler-Lagrange equations of a path; at both ends with the momentum of the boundary state"
+    return Exported(named("residual", path, {"residual": residual_of(scene, path)}), words)
+
+
+def residual_jacobian(scene: Scene) -> Exported:
+    """Derivatives of the residual by every argument."""
+    path = path_symbols(scene)
+    rows = ca.vec(residual_of(scene, path))
+    outputs = {f"by_{name}": ca.jacobian(rows, ca.vec(symbol)) for name, symbol in path.items()}
+    words = "derivative of the residual by {}, both stacked column after column"
+    units = {name: "N/({})" if "/" in TERMS[name].unit else "N/{}" for name in path}
+    terms = {f"by_{name}": Term(units[name].format(TERMS[name].unit), words.format(name)) for name in path}
+    return Exported(named("residual_jacobian", path, outputs), "sparse derivatives of the residual", terms)
+
+
+def velocities_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
+    """Velocities at the step ends [m/s] from the discrete Legendre transforms."""
+    parts = momenta(scene, path)
+    p = ca.horzcat(-parts[0], parts[-1][:, -1])
+    times = path["start_time"] + path["duration"] * ca.DM(np.linspace(0, 1, scene.steps + 1)).T
+    ends = slice(None, None, scene.rule.degree)
+    mass = path["masses"][:, ends] if scene.burns else path["mass"]
+    velocity = scene.dynamics.velocity.map(scene.steps + 1)
+    return velocity(times, path["positions"][:, ends], p, mass)

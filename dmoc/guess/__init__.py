@@ -1,0 +1,1 @@
+"""Where to start: a path from physics."""

@@ -1,0 +1,220 @@
+"""The path to start from: coast arcs where a point mass attracts, a straight line elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import short
+from dmoc.guess.around import path_around, shortest_flyable
+from dmoc.guess.coast import attractors_of, end_estimates, lone_attractor, orbital_rates, spiral_between
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess, node_fractions, node_weights, step_nodes, uniform_mesh
+from dmoc.motion.momenta import legendre_momenta
+from dmoc.scene.constraints import KeepOut
+from dmoc.scene.problem import TransferProblem
+
+# How near the centre of a keep-out zone a guess is pushed aside, and how far, in radii.
+CENTRAL, PUSH = 0.05, 0.3
+# Steps follow the motion where its rate around attractors varies more than this along the guess.
+UNEVEN, SAMPLES = 5.0, 1000
+# A guess is made at so many nodes, where these are as many a revolution, and interpolated on finer meshes.
+GUESSED, NODES_A_TURN = 2000, 100
+
+
+def starting_guess(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
+) -> Guess:
+    """A guess on the mesh, from what is given, else from the problem's own, else from its physics.
+
+    Raises
+    ------
+    ValueError
+        If the guess has another dimension than the problem or holds a number that is not finite.
+    """
+    given = problem.guess if given is None else given
+    given = getattr(given, "path", given)
+    if isinstance(given, Guess):
+        if given.position.shape[1] != problem.dimension:
+            raise ValueError(
+                f"guess has {given.position.shape[1]} axes but the problem has {problem.dimension}"
+            )
+        return given.onto(mesh, order, hold)
+    fractions = node_fractions(mesh, scheme(order))
+    duration = guess_duration(problem)
+    spiral = False
+    if given is None:
+        position, ends, spiral = _default_path(problem, duration, fractions)
+    else:
+        position = _given_path(problem, given, duration, fractions)
+        ends = _end_states(problem, duration)[1::2]
+        # a smooth path around an attractor is worth its forces, and through them its multipliers
+        spiral = callable(given) and lone_attractor(problem) is not None
+    if not np.isfinite(position).all():
+        node = int(np.argmin(np.isfinite(position).all(axis=1)))
+        raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
+    position = _past_centres(problem, position, fractions)
+    for end, place in ((problem.start, 0), (problem.goal, -1)):
+        known = ~np.isnan(end.fixed()[0])
+        position[place, known] = end.fixed()[0][known]
+    controls = (len(mesh) - 1 if hold else len(fractions), problem.actuator.size(problem.dimension))
+    mass = np.full(len(fractions), problem.mass)
+    guess = Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+    return replace(guess, control=_force_along(problem, guess)) if spiral else guess
+
+
+def guess_on(problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None) -> Guess:
+    """A starting guess; on a mesh of many steps by way of fewer, where these follow its revolutions as well."""
+    fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
+    if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
+        found = starting_guess(problem, fewer, order, hold)
+        if angle_around(problem, found) < 2 * np.pi * GUESSED / NODES_A_TURN:
+            return found.onto(mesh, order, hold)
+    return starting_guess(problem, mesh, order, hold, given)
+
+
+def angle_around(problem: TransferProblem, guess: Guess) -> float:
+    """About the angle that a path turns through around all attractors [rad]."""
+    rates = orbital_rates(problem, guess.position)
+    return float(np.trapezoid(rates, guess.duration * guess.fractions))
+
+
+def is_uneven(problem: TransferProblem, guess: Guess) -> bool:
+    """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
+    rates = orbital_rates(problem, guess.position)
+    return bool(rates.max() > UNEVEN * rates.min())
+
+
+def graded_guess(problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None) -> Guess:
+    """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
+    fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
+    rates = orbital_rates(problem, fine.position)
+    angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
+    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
+    return starting_guess(problem, mesh, order, hold, given)
+
+
+def _force_along(problem: TransferProblem, guess: Guess) -> np.ndarray:
+    """The controls that take the body along a guess, by the discrete equations; within the limits.
+
+    A path that meets its equations also has multipliers near the right ones, by least squares.
+    """
+    n, rule = problem.dimension, scheme(guess.order)
+    more = problem.actuator.labels(n)[n:]
+    if guess.control.shape[1] < n or more not in ((), ("throttle",)):
+        return guess.control
+    dynamics, begin = Dynamics.of(problem), problem.start_time
+    at, rows = step_nodes(len(guess.mesh) - 1, rule), np.zeros_like(guess.position)
+    np.add.at(rows, at, legendre_momenta(dynamics, guess, begin))
+    ends = ((0, begin, guess.start_velocity, 1), (-1, begin + guess.duration, guess.goal_velocity, -1))
+    for place, t, v, sign in ends:
+        rows[place] += sign * dynamics.point(t, guess.position[place], v, problem.mass)[1].full().ravel()
+    force = -problem.mass * rows / (guess.duration * node_weights(guess.mesh, rule))[:, None]
+    if guess.hold:
+        force = np.einsum("j,jkn->kn", rule.weights, force[at])
+    thrust, limit = np.linalg.norm(force, axis=1, keepdims=True), problem.actuator.force_limit()
+    control = np.hstack([force, thrust]) if more else force
+    return control if limit is None else control * min(1.0, limit / (thrust.max() or limit))
+
+
+def guess_duration(problem: TransferProblem) -> float:
+    """The duration, or a likely one within its bounds [s].
+
+    With a force limit: from rest to rest over the distance and the change of velocity at full
+    force, and a fifth more; between two places near an attractor as long as the default path needs;
+    where the angle on an orbit is open, over the distance from the attractor
+    or the change of the orbit, whatever is longer. Otherwise the geometric mean of the bounds.
+    """
+    shortest, longest = problem.duration_bounds
+    if not problem.free_duration:
+        return shortest
+    limit = problem.actuator.force_limit()
+    middle = float(np.sqrt(shortest * longest))
+    if limit is None:
+        return middle
+    q0, v0, q1, v1 = _end_states(problem, middle)
+    acceleration = limit / problem.mass
+    if lone_attractor(problem) is not None and problem.start.anchored and problem.goal.anchored:
+        return shortest_flyable(problem, partial(_ends_in_pairs, problem), acceleration)
+    spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
+    if spiral is not None:
+        needed = max(2 * np.sqrt(spiral.climb / acceleration), spiral.velocity_change / acceleration)
+    else:
+        needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
+    return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
+
+
+def _given_path(problem: TransferProblem, given: Any, duration: float, fractions: np.ndarray) -> np.ndarray:
+    times = problem.start_time + duration * fractions
+    try:
+        if callable(given):
+            position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times])
+        else:
+            known, values = (np.asarray(part, float) for part in given)
+            values = values.reshape(len(known), -1)
+            if not (np.isfinite(known).all() and (np.diff(known) > 0).all()):
+                raise ValueError("its times do not increase")
+            position = np.stack([np.interp(times, known, column) for column in values.T], axis=1)
+    except Exception as error:  # whatever a user's function raises
+        raise ValueError(
+            "guess must be a function of time [s] that gives positions [m], a pair (times, positions) or a "
+            f"former solution; {short(given)} fails: {' '.join(str(error).split())[:120]}"
+        ) from error
+    if position.shape != (len(fractions), problem.dimension):
+        found = position.shape[-1] if position.ndim == 2 else f"{position.ndim - 1} times nested"
+        raise ValueError(f"guess has {found} axes but the problem has {problem.dimension}")
+    return position
+
+
+def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
+    """Start position and velocity, goal position and velocity, with likely values for what is free."""
+    (q0, v0), (q1, v1) = end_estimates(problem, duration)
+    q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1), q0)
+    q1 = np.where(np.isnan(q1), q0, q1)
+    mean = (q1 - q0) / duration
+    return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
+
+
+def _ends_in_pairs(problem: TransferProblem, duration: float) -> tuple:
+    q0, v0, q1, v1 = _end_states(problem, duration)
+    return (q0, v0), (q1, v1)
+
+
+def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
+    """Positions, the velocities of both ends, and whether the path is worth its forces."""
+    q0, v0, q1, v1 = _end_states(problem, duration)
+    if not attractors_of(problem):
+        return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
+    path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
+    return path, (v0, v1), worth
+
+
+def _past_centres(problem: TransferProblem, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """Push a guess aside where it runs through the centre of a keep-out zone.
+
+    There no side is nearer than the other, and every step of the optimiser keeps to the middle.
+    """
+    for zone in problem.constraints:
+        if not isinstance(zone, KeepOut) or problem.dimension == 1:
+            continue
+        offset = path - np.asarray(zone.center)
+        distance = np.linalg.norm(offset, axis=1)
+        node = int(np.clip(np.argmin(distance), 1, len(path) - 2))
+        along = path[node + 1] - path[node - 1]
+        along /= np.linalg.norm(along) or 1.0
+        aside = offset[node] - (offset[node] @ along) * along
+        if distance[node] > zone.radius or np.linalg.norm(aside) > CENTRAL * zone.radius:
+            continue
+        if np.linalg.norm(aside) <= 1e-6 * zone.radius:
+            # the axis that the path follows least, then the next one, are turned to stand across it
+            order = np.argsort(np.abs(along), kind="stable")
+            aside = np.zeros_like(along)
+            aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
+        near = np.maximum(0.0, 1 - (distance / (2 * zone.radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
+        push = PUSH * zone.radius * near / max(near[node], 1e-3)
+        path = path + push[:, None] * aside / np.linalg.norm(aside)
+    return path

@@ -1,0 +1,1 @@
+"""How it moves: the discrete equations, forward in time, and an independent integrator."""

@@ -1,0 +1,226 @@
+"""Forward integration of the same scheme."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess, node_fractions, step_nodes, uniform_mesh
+from dmoc.scene.problem import TransferProblem
+
+# Steps of one piece of a forward march: a map of 100,000 steps takes ten times longer to build than to run.
+PIECE = 4096
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A path found by forward integration, at the step ends; SI units, one row an end.
+
+    Attributes
+    ----------
+    time : array, shape (steps+1,)
+        [s].
+    position, velocity : arrays, shape (steps+1, axes)
+        [m], [m/s].
+    momentum : array, shape (steps+1, axes)
+        dl/dv, per unit mass [m/s].
+    mass : array, shape (steps+1,)
+        [kg].
+    energy : array, shape (steps+1,)
+        v . dl/dv - l, per unit mass [J/kg].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    momentum: np.ndarray
+    mass: np.ndarray
+    energy: np.ndarray
+
+
+def simulate(
+    problem: TransferProblem,
+    controls: Any = None,
+    steps: int | None = None,
+    order: int = 2,
+    hold: bool = False,
+    duration: float | None = None,
+    compensated: bool = False,
+) -> Trajectory:
+    """Integrate a scene forward from its start with the variational scheme.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+        Its start must be a state without free entries.
+    controls : Solution or array, optional
+        A solution, whose mesh, order and controls are then used, or controls of shape
+        (steps*s+1, size), with hold (steps, size); nothing for a coast.
+    steps, order, hold
+        As in `solve`, if `controls` is not a solution.
+    duration : float, optional
+        [s], if it is not the problem's.
+    compensated : bool
+        Carry what each addition of a step loses to rounding on to the next step (Kahan's sum): over a
+        million explicit steps angular momentum is then kept to the last bit. Takes up to twice as long.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ValueError
+        If the start is not fixed, or the controls do not fit the mesh.
+    """
+    of_kind("problem", problem, TransferProblem)
+    hold, compensated = flag("hold", hold), flag("compensated", compensated)
+    dynamics = Dynamics.of(problem)
+    position, velocity = problem.start.fixed()
+    if np.isnan(position).any() or np.isnan(velocity).any():
+        raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
+    path = getattr(controls, "path", None)
+    if path is None:
+        path = _given_path(problem, controls, steps, order, hold, duration)
+    elif path.position.shape[1:] + path.control.shape[1:] != (
+        problem.dimension,
+        problem.actuator.size(problem.dimension),
+    ):
+        raise ValueError("the solution has another dimension or other controls than the problem")
+    path = replace(path, mass=node_masses(dynamics, path, problem.mass))
+    time = problem.start_time + path.duration * path.mesh
+    mass = path.mass[:: scheme(path.order).degree]
+    momentum = dynamics.point(time[0], position, velocity, mass[0])[1]
+    q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel(), compensated)
+    v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
+    energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
+    return Trajectory(time, q, v, p, mass, energy)
+
+
+def _given_path(
+    problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
+) -> Guess:
+    """Controls on a mesh, checked, as a path that stays at the start."""
+    mesh = uniform_mesh(400 if steps is None else whole("steps", steps))
+    nodes = len(node_fractions(mesh, scheme(order)))
+    shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
+    try:
+        given = np.zeros(shape) if controls is None else np.asarray(controls, float)
+    except Exception:  # whatever a user's object raises
+        raise ValueError(f"controls must be a Solution or an array of numbers; got {short(controls)}") from None
+    if given.shape != shape:
+        raise ValueError(f"controls must have shape {shape} on this mesh; got {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(
+            f"controls must be finite; row {int(np.argmin(np.isfinite(given).all(axis=1)))} is not"
+        )
+    longest = (
+        problem.duration_bounds[1] if duration is None else number("duration", duration, "s", positive=True)
+    )
+    position, velocity = problem.start.fixed()
+    mass = np.full(nodes, problem.mass)
+    return Guess(mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity)
+
+
+def node_masses(dynamics: Dynamics, path: Guess, mass: float) -> np.ndarray:
+    """Masses of the nodes [kg], shape (nodes,), from that at the start and the controls of a path.
+
+    m_i = m_0 - h sum_j A_ij flow_j with the Lobatto IIIA matrix A, as in the transcription.
+    """
+    rule, at = scheme(path.order), step_nodes(len(path.mesh) - 1, scheme(path.order))
+    masses = np.full(at[-1, -1] + 1, float(mass))
+    if not dynamics.actuator.burns:
+        return masses
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    flow = ca.Function("flow", [u], [ca.densify(dynamics.actuator.flow(u))])(path.control.T).full().ravel()
+    h = path.duration * np.diff(path.mesh)
+    burnt = h * (rule.integral @ (np.tile(flow, (rule.degree + 1, 1)) if path.hold else flow[at]))
+    before = np.concatenate([[0.0], np.cumsum(burnt[-1])])
+    masses[at] -= before[:-1] + burnt
+    masses[-1] = mass - before[-1]
+    return masses
+
+
+def rollout(
+    dynamics: Dynamics,
+    path: Guess,
+    start_time: float,
+    position: np.ndarray,
+    momentum: np.ndarray,
+    compensated: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] and momenta per mass [m/s] at the step ends, of shape (steps+1, axes), from the start.
+
+    Only the mesh, masses and controls of `path` are used, and its first position as the origin.
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    advance, inputs = _advance(dynamics, path, start_time, compensated)
+    states = np.zeros((advance.numel_out(0), steps + 1))
+    states[: 2 * n, 0] = np.concatenate([position - path.position[0], momentum])
+    march = advance.mapaccum(min(steps, PIECE))
+    for begin in range(0, steps, PIECE):
+        count = min(PIECE, steps - begin)
+        if count < PIECE and begin:
+            march = advance.mapaccum(count)
+        pieces = [value.reshape(len(value), steps, -1)[:, begin : begin + count] for value in inputs]
+        found = march(states[:, begin], *(piece.reshape(len(piece), -1) for piece in pieces))
+        states[:, begin + 1 : begin + count + 1] = found
+    return states[:n].T + path.position[0], states[n : 2 * n].T
+
+
+def _advance(
+    dynamics: Dynamics, path: Guess, start_time: float, compensated: bool = False
+) -> tuple[ca.Function, list]:
+    """(state, m, u, t, h) -> the state one step later, and its inputs for all steps side by side.
+
+    Compensated, the state is twice as long: its second half is what rounding has added so far.
+    """
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    inputs = _inputs(path, start_time)
+    given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
+    state = ca.MX.sym("state", 2 * n)
+    increments = step_map(dynamics, rule, path.hold)(state[:n], state[n:], *given, path.position[0])
+    if compensated:
+        return _compensated(state, given, ca.vertcat(*increments[:2])), inputs
+    advance = ca.Function("advance", [state, *given], [state + ca.vertcat(*increments[:2])])
+    # an explicit step has no root to find: as one plain expression it is three times as fast
+    explicit = rule.degree == 1 and not dynamics.depends_on_velocity
+    return advance.expand() if explicit else advance, inputs
+
+
+def _inputs(path: Guess, start_time: float) -> list[np.ndarray]:
+    """Masses, controls, begin and length of all steps, side by side."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    at = step_nodes(steps, rule)
+    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
+    times = start_time + path.duration * path.mesh[:-1]
+    lengths = path.duration * np.diff(path.mesh)
+    if np.array_equal(path.mesh, uniform_mesh(steps)):
+        # fractions differ by round-off, 1e-12 of a step in 20,000: steps must be equal to keep the energy
+        lengths[:] = path.duration / steps
+    return [path.mass[at], control.T, times[None], lengths[None]]
+
+
+def _compensated(state: ca.MX, given: list, increments: ca.MX) -> ca.Function:
+    """Kahan's sum of a state and its increments; as one expression CasADi would make it the plain sum."""
+    a, b = ca.SX.sym("a", state.numel()), ca.SX.sym("b", state.numel())
+    add = ca.Function("add", [a, b], [a + b], {"never_inline": True})
+    subtract = ca.Function("subtract", [a, b], [a - b], {"never_inline": True})
+    excess = ca.MX.sym("excess", state.numel())
+    wanted = subtract(increments, excess)
+    reached = add(state, wanted)
+    left = subtract(subtract(reached, state), wanted)
+    return ca.Function("advance", [ca.vertcat(state, excess), *given], [ca.vertcat(reached, left)])
+
+
+def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
+    """Force [N] of controls, one row each."""
+    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
+    return np.array(force(control.T)).T.reshape(len(control), dynamics.dimension)

@@ -1,0 +1,109 @@
+"""Momenta of a path: the discrete Legendre transforms of its steps."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.memory import kept
+from dmoc.motion.dynamics import Dynamics, step_momenta
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess, step_nodes
+
+
+def end_momenta(
+    dynamics: Dynamics, path: Guess, start_time: float, momenta: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
+
+    The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
+    end what arrives there. `momenta` are the `legendre_momenta` if they are known.
+    """
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    if momenta is None:
+        momenta = legendre_momenta(dynamics, path, start_time)
+    p = np.concatenate([-momenta[0], momenta[-1][-1:]])
+    if not dynamics.depends_on_velocity:
+        return p, p.copy()
+    times = start_time + path.duration * path.mesh
+    v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
+    return p, np.array(v).T.reshape(-1, n)
+
+
+def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
+    momenta = legendre_function(dynamics, path.order, path.hold)(*_given(path, start_time))
+    return np.array([np.array(momentum).T.reshape(len(path.mesh) - 1, -1) for momentum in momenta])
+
+
+def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
+
+    By the implicit function theorem from the slopes B of the momenta: p_0 = -P_0, P_1 = .. = P_{s-1} = 0
+    and p_1 = P_s are linear in the changes of all positions of the step. All are infinite if one step's
+    equations have no solution.
+    """
+    n, s, steps = dynamics.dimension, scheme(path.order).degree, len(path.mesh) - 1
+    make = partial(_legendre_slopes, dynamics, path.order, path.hold)
+    function = kept(make, "legendre slopes", dynamics, path.order, path.hold)
+    slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    inner, start = slopes[:, : n * s, n:], np.zeros((steps, n * s, 2 * n))
+    start[:, :, :n], start[:, :n, n:] = -slopes[:, : n * s, :n], -np.eye(n)
+    try:
+        moves = np.linalg.solve(inner, start)
+    except np.linalg.LinAlgError:  # a step so long that its equations have no one solution
+        return np.full((steps, 2 * n, 2 * n), np.inf)
+    last = slopes[:, n * s :]
+    momenta = last[:, :, n:] @ moves
+    momenta[:, :, :n] += last[:, :, :n]
+    return np.concatenate([moves[:, n * (s - 1) :], momenta], axis=1)
+
+
+def _given(path: Guess, start_time: float) -> tuple:
+    """What the functions of a step are given, the steps of a path side by side."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    at, origin = step_nodes(steps, rule), path.position[0]
+
+    def stacked(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values[at[j]].T for j in range(rule.degree + 1)])
+
+    control = path.control.T if path.hold else stacked(path.control)
+    times = (start_time + path.duration * path.mesh[:-1])[None]
+    lengths = path.duration * np.diff(path.mesh)[None]
+    return stacked(path.position - origin), path.mass[at], control, times, lengths, origin
+
+
+def _legendre_slopes(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(q, m, u, t, h, origin) -> derivative of P_0 .. P_s in q."""
+    function = legendre_function(dynamics, order, hold)
+    given = function.sx_in()
+    slopes = ca.jacobian(ca.vertcat(*function.call(given)), given[0])
+    return ca.Function("slopes", given, [ca.densify(slopes)])
+
+
+def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    """(q, m, u, t, h, origin) -> P_0 .. P_s [m/s] of one step, whole: effects, kinetic energy and actuator.
+
+    q are the s + 1 positions stacked, from `origin` [m]; u the controls of the nodes stacked, or of the step.
+    """
+    return kept(partial(_legendre_function, dynamics, order, hold), "legendre", dynamics, order, hold)
+
+
+def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
+    rule, n = scheme(order), dynamics.dimension
+    size = dynamics.actuator.size(n)
+    q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
+    u = ca.SX.sym("u", size * (1 if hold else rule.degree + 1))
+    t, h, origin = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("origin", n)
+    push = [
+        dynamics.actuator.force(u[:size] if hold else u[size * j : size * (j + 1)]) / m[j]
+        for j in range(rule.degree + 1)
+    ]
+
+    def point(t, r, v, m):
+        return dynamics.point(t, r + origin, v, m)
+
+    momenta = step_momenta(rule, point, t, h, ca.vertsplit(q, n), ca.vertsplit(m), push)
+    return ca.Function("legendre", [q, m, u, t, h, origin], momenta)

@@ -1,0 +1,137 @@
+"""An independent integrator: the equations of motion, without the scheme."""
+
+from __future__ import annotations
+
+from functools import partial
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.memory import kept
+from dmoc.motion.dynamics import Dynamics, weighted
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess, step_nodes
+
+# Where the independent integrator gives up: a path that needs more parts runs into a singularity.
+MOST_PARTS = 1_000_000
+
+
+def reference(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position [m] and velocity [m/s] at the goal by DOP853, from the start with the path's controls.
+
+    Dormand and Prince's Runge-Kutta method of order 8 with the coefficients and the error estimate of
+    SciPy, on the equations of motion: it knows nothing of the scheme. The control is the polynomial
+    through each step's Lobatto nodes, with hold the held value; the integrator restarts at every step
+    end, where its derivatives jump, and cuts a step in parts until its error is below 1e-11.
+
+    Returns
+    -------
+    position, velocity : arrays
+        NaN where the motion cannot be integrated.
+    """
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    control = _control_powers(dynamics, path)
+    start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
+    march_one = kept(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
+    given = march_one.mx_in()[:-2]
+    constants = path.position[0], _tolerances(path, velocity, control)
+    advance = ca.Function("advance", given, march_one(*given, *constants))
+    parts = np.ones(steps, int)
+    while parts.sum() <= MOST_PARTS:
+        owner = np.repeat(np.arange(steps), parts)
+        share = 1 / parts[owner]
+        begin = (np.arange(len(owner)) - (np.cumsum(parts) - parts)[owner]) * share
+        h = path.duration * np.diff(path.mesh)[owner]
+        times = start_time + path.duration * path.mesh[:-1][owner]
+        march = advance.mapaccum(len(owner))
+        states, errors = march(start, control[:, owner], times[None], h[None], begin[None], share[None])
+        worst = np.zeros(steps)
+        np.maximum.at(worst, owner, errors.full().ravel())
+        if not np.isfinite(worst).all():
+            break
+        if worst.max() <= 1:
+            end = states.full()[:, -1]
+            return path.position[0] + end[:n], end[n : 2 * n]
+        parts = parts * np.where(worst > 1, np.ceil(np.clip(1.1 * worst**0.125, 2, 64)), 1).astype(int)
+    return np.full(n, np.nan), np.full(n, np.nan)
+
+
+def _control_powers(dynamics: Dynamics, path: Guess) -> np.ndarray:
+    """Controls of every step as a polynomial in the fraction of the step, shape (size (s+1), steps)."""
+    if path.hold:
+        return path.control.T
+    rule = scheme(path.order)
+    nodes = path.control[step_nodes(len(path.mesh) - 1, rule)]
+    to_powers = np.linalg.inv(np.vander(rule.points, increasing=True))
+    powers = np.einsum("pj,jkn->pnk", to_powers, nodes)
+    return powers.reshape(-1, powers.shape[2])
+
+
+def _tolerances(path: Guess, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
+    """Absolute errors [m], [m/s], [kg] that do not matter: 1e-12 of what the motion is made of."""
+    n, duration = path.position.shape[1], path.duration
+    thrust = np.abs(control).max(initial=0.0) / path.mass.min()
+    # a body held in place has no extent: then what the thrust alone would do is the measure
+    extent = max(np.ptp(path.position, axis=0).max(), 1e-3 * thrust * duration**2) or 1.0
+    speed = max(extent / duration, np.abs(velocity).max())
+    return 1e-12 * np.concatenate([np.repeat([extent, speed], n), path.mass[:1]])
+
+
+def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
+    """(state, control, t, h, begin, share, origin, tolerances) -> state after that part of a step, error.
+
+    The error is in units of its tolerance. The state is position from `origin`, velocity and mass;
+    `control` the coefficients of `_control_powers`; a part is `share` of a step of length h [s] that
+    starts at t [s], from the fraction `begin` on.
+    """
+    places, rows, *weights = coefficients()
+    n, count = dynamics.dimension, dynamics.actuator.size(dynamics.dimension)
+    state, powers = ca.SX.sym("state", 2 * n + 1), ca.SX.sym("control", size)
+    t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
+    origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", 2 * n + 1)
+
+    def rate(fraction, y):
+        u = sum(powers[count * p : count * (p + 1)] * fraction**p for p in range(size // count))
+        force, flow = dynamics.actuator.force(u), dynamics.actuator.flow(u)
+        v = y[n : 2 * n]
+        push = dynamics.acceleration(t + fraction * h, y[:n] + origin, v, y[-1], force)
+        return ca.vertcat(v, push, 0 if flow is None else -flow)
+
+    length = share * h
+    slopes: list[ca.SX] = []
+    for place, row in zip(places, rows, strict=True):
+        moved = weighted(row[: len(slopes)], slopes)
+        slopes.append(rate(begin + place * share, state + length * moved))
+    after = state + length * weighted(weights[0], slopes)
+    slopes.append(rate(begin + share, after))
+    scale = tolerances + 1e-11 * ca.fmax(ca.fabs(state), ca.fabs(after))
+    third, fifth = (ca.sumsqr(weighted(row, slopes) / scale) for row in weights[1:])
+    error = length * fifth / ca.sqrt((fifth + 0.01 * third) * state.numel() + 1e-300)
+    return ca.Function("dop853", [state, powers, t, h, begin, share, origin, tolerances], [after, error])
+
+
+def coefficients() -> tuple[np.ndarray, ...]:
+    """Of DOP853: places, slopes and weights of its stages, weights of its third and fifth order errors.
+
+    They are SciPy's. Its integrators take as long to import as a small solve, so their table is read alone.
+    """
+    try:
+        table = _scipys_table()
+        stages = len(table.B)
+        return table.C[:stages], table.A[:stages, :stages], table.B, table.E3, table.E5
+    except (AttributeError, ImportError, OSError):
+        from scipy.integrate import DOP853
+
+        return DOP853.C, DOP853.A, DOP853.B, DOP853.E3, DOP853.E5
+
+
+def _scipys_table() -> Any:
+    folder = find_spec("scipy").submodule_search_locations[0]  # type: ignore[union-attr, index]
+    spec = spec_from_file_location("dop853", f"{folder}/integrate/_ivp/dop853_coefficients.py")
+    table = module_from_spec(spec)  # type: ignore[arg-type]
+    spec.loader.exec_module(table)  # type: ignore[union-attr]
+    return table

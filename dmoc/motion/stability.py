@@ -1,0 +1,110 @@
+"""Growth of the one-step matrix against that of the exact flow, along a path and before a solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess
+from dmoc.motion.momenta import step_matrices
+
+# Frozen along a path the two differ by what the path changes within a step; where the linearisation is
+# constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.
+GROWTH, GROWTH_CONSTANT = 1.05, 1.001
+# Eigenvalues are found where h omega may exceed the first, and at as many of the other steps as the second.
+NEGLIGIBLE, LOOKED_AT = 0.1, 200
+# A step this short, in units of the fastest rate, is stable by far whatever the order.
+HARMLESS = 0.5
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Largest spectral radius of a one-step matrix over the exact flow's, what is allowed, and h omega."""
+
+    value: float
+    limit: float
+    frequency: float
+    constant: bool
+
+    @property
+    def ok(self) -> bool:
+        return self.value <= self.limit
+
+
+def growth_along(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray, matrices: np.ndarray
+) -> Growth:
+    """Growth of the steps of a path, from its `step_matrices` and velocities at the step ends [m/s]."""
+    flow, constant = flow_matrices(dynamics, path, start_time, velocity)
+    limit = GROWTH_CONSTANT if constant else GROWTH
+    if not (np.isfinite(flow).all() and np.isfinite(matrices).all()):
+        return Growth(np.inf, limit, np.inf, constant)
+    h, fastest = path.duration * np.diff(path.mesh), _rate_bound(flow)
+    reach = h * np.maximum(fastest[:-1], fastest[1:])
+    # below a tenth no scheme is unstable, and a mesh of many steps is there almost everywhere
+    chosen = reach > NEGLIGIBLE
+    chosen[np.argsort(reach)[-LOOKED_AT:]] = True
+    looked_at = np.flatnonzero(chosen)
+    rates = np.linalg.eigvals([flow[looked_at], flow[looked_at + 1]])
+    exact = np.exp(h[looked_at] * rates.real.max(axis=(0, 2)))
+    ours = np.abs(np.linalg.eigvals(matrices[looked_at])).max(axis=1)
+    frequency = h[looked_at] * np.abs(rates).max(axis=(0, 2))
+    return Growth(float(np.max(ours / exact)), limit, float(frequency.max()), constant)
+
+
+def _rate_bound(flow: np.ndarray) -> np.ndarray:
+    """No eigenvalue of [[0, 1], [K, G]] is larger than the root of x^2 = |G| x + |K| [1/s]."""
+    n = flow.shape[1] // 2
+    stiffness, damping = (np.linalg.norm(part, axis=(1, 2)) for part in (flow[:, n:, :n], flow[:, n:, n:]))
+    return 0.5 * (damping + np.sqrt(damping**2 + 4 * stiffness))
+
+
+def flow_matrices(
+    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+) -> tuple[np.ndarray, bool]:
+    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
+    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    function, constant = dynamics.linearised
+    times = start_time + path.duration * path.mesh
+    stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
+    return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
+
+
+def refuse_unstable(dynamics: Dynamics, guess: Guess, start_time: float, shortest: float) -> None:
+    """Refuse a mesh beyond the scheme's stability limit where that is known before the solve.
+
+    It is known where the linearisation does not depend on the state; elsewhere the check of the
+    solution tells.
+
+    Raises
+    ------
+    ValueError
+        With h omega, the growth per step and the number of steps that is enough.
+    """
+    longest = np.diff(guess.mesh).max()
+    order, degree = guess.order, guess.order // 2
+    nodes = np.linspace(0, len(guess.position) - 1, 2 * degree + 1).round().astype(int)
+    probe = replace(
+        guess,
+        mesh=np.array([0.0, 0.5, 1.0]),
+        duration=2 * longest * shortest,
+        position=guess.position[nodes],
+        mass=guess.mass[nodes],
+        control=np.zeros((2 if guess.hold else len(nodes), guess.control.shape[1])),
+    )
+    velocity = np.zeros((3, dynamics.dimension))
+    flow, constant = flow_matrices(dynamics, probe, start_time, velocity)
+    if not constant or longest * shortest * _rate_bound(flow).max() < HARMLESS:
+        return
+    matrices = step_matrices(dynamics, probe, start_time)
+    growth = growth_along(dynamics, probe, start_time, velocity, matrices)
+    if not growth.ok:
+        steps = len(guess.mesh) - 1
+        enough = int(steps * growth.frequency) + 1
+        raise ValueError(
+            f"{steps} steps of order {order} are unstable for this scene: h omega = {growth.frequency:.3g}, "
+            f"errors grow {growth.value:.3g} times a step; use at least {enough} steps"
+        )

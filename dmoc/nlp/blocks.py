@@ -1,0 +1,83 @@
+"""The layout of a problem's unknowns and rows on a mesh, and the blocks that fill it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dmoc.motion.lobatto import Scheme
+from dmoc.motion.mesh import node_fractions, node_weights
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.layout import Layout
+from dmoc.nlp.stencils import AXES, Stencil, formulas_of
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.rows import Row
+
+
+class Transcript:
+    """The formulas of one problem, put on one mesh."""
+
+    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, mesh: np.ndarray, units: Any):
+        self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
+        formulas = formulas_of(problem, rule.order, hold)
+        self.parameter_count = formulas.parameter_count
+        self.steps = len(mesh) - 1
+        self.counts = {"node": self.steps * rule.degree + 1, "step": self.steps, "ends": 1}
+        self.columns = self._columns()
+        self.rows = Layout()
+        self._lower: list[np.ndarray] = []
+        self._upper: list[np.ndarray] = []
+        impulse = problem.mass / (units.force * units.time)
+        axes = [Row(axis, 0, 0.0, 0.0) for axis in AXES[: problem.dimension]]
+        self._add_rows("dynamics", "smooth", axes, self.counts["node"], impulse)
+        numbers = {
+            "fraction": node_fractions(mesh, rule),
+            "weight": node_weights(mesh, rule),
+            "begin": mesh[:-1],
+            "length": np.diff(mesh),
+        }
+        self.blocks = [self._block(stencil, numbers) for stencil in formulas.stencils]
+
+    @property
+    def row_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled bounds of all rows."""
+        return np.concatenate(self._lower), np.concatenate(self._upper)
+
+    def _columns(self) -> Layout:
+        problem, units, nodes = self.problem, self.units, self.counts["node"]
+        axes, speed = AXES[: problem.dimension], units.length / units.time
+        columns = Layout().add("position", "node", axes, nodes, units.length)
+        labels = problem.actuator.labels(problem.dimension)
+        columns = columns.add("force", "control", labels, self.steps if self.hold else nodes, units.force)
+        if problem.actuator.burns:
+            columns = columns.add("mass", "node", ("",), nodes, units.mass)
+        columns = columns.add("start.velocity", "end", axes, 1, speed)
+        columns = columns.add("goal.velocity", "end", axes, 1, speed)
+        return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
+
+    def _add_rows(self, name: str, kind: str, rows: Sequence[Row], count: int, scale: Any) -> None:
+        self.rows = self.rows.add(name, kind, [row.name for row in rows], count, scale)
+        scales = self.rows.groups[-1].scales
+        self._lower.append((np.array([row.lower for row in rows]) * scales).ravel())
+        self._upper.append((np.array([row.upper for row in rows]) * scales).ravel())
+
+    def _block(self, stencil: Stencil, numbers: dict[str, np.ndarray]) -> Block:
+        """A stencil with its places on the mesh, after its own rows have been added to the layout."""
+        units, count = self.units, self.counts[stencil.every]
+        sizes = {"": 1.0, "m": units.length, "m/s": units.length / units.time, "kg": units.mass}
+        for name, kind, rows in stencil.limits:
+            self._add_rows(name, kind, rows, count, np.array([[1 / sizes[row.unit] for row in rows]]))
+
+        def stacked(layout: Layout, places: Sequence[tuple[str, slice]]) -> np.ndarray:
+            found = [layout[group].indices[:, at] for group, at in places]
+            return np.vstack([np.broadcast_to(each, (len(each), count)) for each in found])
+
+        values = [numbers[name] for name in stencil.numbers]
+        return Block(
+            stencil.kernel,
+            stacked(self.columns, stencil.unknowns),
+            stacked(self.rows, stencil.targets),
+            np.vstack(values) if values else np.empty((0, count)),
+        )

@@ -1,0 +1,139 @@
+"""How far limits are from being met: the same NLP with one limit, or every row, made elastic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.motion.mesh import Guess
+from dmoc.nlp.transcription import NLP
+from dmoc.scene.problem import TransferProblem
+
+# The effort's weight beside the slack: it makes the path unique, and moves the slack by about as much.
+EFFORT_SHARE = 1e-4
+MOST_ITERATIONS = 200
+# Rows of a path that meets them, scaled.
+MET = 1e-7
+WARM = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.mu_init": 1e-4,
+    "ipopt.warm_start_bound_push": 1e-8,
+    "ipopt.warm_start_bound_frac": 1e-8,
+    "ipopt.warm_start_slack_bound_push": 1e-8,
+    "ipopt.warm_start_slack_bound_frac": 1e-8,
+    "ipopt.warm_start_mult_bound_push": 1e-8,
+}
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """What one elastic NLP gave: the slacks, the path, whether it keeps all rows but for the slacks."""
+
+    slack: np.ndarray
+    path: Guess
+    feasible: bool
+    multipliers: dict[str, Any] = field(default_factory=dict)
+
+
+class Relaxation:
+    """An NLP whose rows g and unknowns x keep their limits but for slacks s >= least, at the least sum of s.
+
+        lbg <= g(x) + G s <= ubg,      lbx - below s <= x <= ubx + above s
+
+    One slack for many limits finds the least factor by which all of them must give way; two for every
+    row find rows that cannot be met together. Exact derivatives, those of the NLP and constants.
+
+    Parameters
+    ----------
+    nlp : NLP
+        Its objective should be the effort.
+    rows : array, shape (rows, slacks)
+        G.
+    columns : array of int
+        Unknowns whose limits give way by the first slack.
+    below, above : arrays
+        How far their lower and upper limits do.
+    """
+
+    def __init__(self, nlp: NLP, rows: np.ndarray, columns=(), below=(), above=(), least: float = 0.0):
+        self.nlp, self.least, self.count = nlp, least, rows.shape[1]
+        self.columns = np.asarray(columns, int)
+        number = len(self.columns)
+        # each of these unknowns becomes a row of its own, once for either side
+        pick = ca.DM.triplet(
+            list(range(number)), self.columns.tolist(), ca.DM.ones(number), number, nlp.columns.size
+        )
+        share = np.zeros((2 * number, self.count))
+        share[:, 0] = np.concatenate([-np.asarray(above, float), np.asarray(below, float)])
+        nlp_parts, settings = self._parts(_sparse(rows), ca.vertcat(pick, pick), _sparse(share))
+        self.solver = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings)
+        self.warm = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings | WARM)
+
+    def _parts(self, elastic: ca.DM, pick: ca.DM, share: ca.DM) -> tuple[dict, dict]:
+        """The elastic NLP, and Ipopt's settings with its exact derivatives."""
+        parts, size, rows = self.nlp.assembly, self.nlp.columns.size, self.nlp.rows.size
+        z, p = ca.MX.sym("z", size + self.count), parts.p
+        x, slack = z[:size], z[size:]
+        cost = ca.sum1(slack) + EFFORT_SHARE * parts.objective(x, p)
+        slope = ca.vertcat(EFFORT_SHARE * parts.gradient(x, p)[1], ca.MX.ones(self.count, 1))
+        g = ca.vertcat(parts.constraints(x, p) + elastic @ slack, pick @ x + share @ slack)
+        jacobian = ca.vertcat(ca.horzcat(parts.jacobian(x, p)[1], elastic), ca.horzcat(pick, share))
+        weight, multipliers = ca.MX.sym("weight"), ca.MX.sym("multipliers", g.numel())
+        hessian = parts.hessian(x, p, EFFORT_SHARE * weight, multipliers[:rows])
+        settings = {
+            "jac_g": ca.Function(
+                "nlp_jac_g", [z, p], [ca.MX(*g.shape), jacobian], ["x", "p"], ["g", "jac_g_x"]
+            ),
+            "grad_f": ca.Function("nlp_grad_f", [z, p], [ca.MX(1, 1), slope], ["x", "p"], ["f", "grad_f_x"]),
+            "hess_lag": ca.Function(
+                "nlp_hess_l",
+                [z, p, weight, multipliers],
+                [ca.diagcat(hessian, ca.MX(self.count, self.count))],
+                ["x", "p", "lam_f", "lam_g"],
+                ["h"],
+            ),
+            "no_nlp_grad": True,
+            "calc_lam_p": False,
+            "print_time": False,
+            "error_on_fail": False,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.linear_solver": "mumps",
+            "ipopt.nlp_scaling_method": "none",
+            "ipopt.mumps_permuting_scaling": 0,
+            "ipopt.acceptable_iter": 0,
+            "ipopt.max_iter": MOST_ITERATIONS,
+        }
+        return {"x": z, "p": p, "f": cost, "g": g}, settings
+
+    def __call__(self, problem: TransferProblem, guess: Guess, near: Relaxed | None = None) -> Relaxed:
+        """Solve for a problem that the NLP accepts, from a path on its mesh, or from an answer near by."""
+        lbx, ubx, lbg, ubg = self.nlp.bounds(problem)
+        low, high = lbx[self.columns], ubx[self.columns]
+        start, free = np.clip(self.nlp.pack(guess), lbx, ubx), np.full(self.count, np.inf)
+        lbx[self.columns], ubx[self.columns] = -np.inf, np.inf
+        none = np.full(len(low), np.inf)
+        solver = self.solver if near is None else self.warm
+        slack = np.ones(self.count) if near is None else near.slack
+        bounds = {
+            "lbx": np.concatenate([lbx, np.full(self.count, self.least)]),
+            "ubx": np.concatenate([ubx, free]),
+            "lbg": np.concatenate([lbg, -none, low]),
+            "ubg": np.concatenate([ubg, high, none]),
+        }
+        known = {} if near is None else near.multipliers
+        found: Any = solver(
+            x0=np.concatenate([start, slack]), p=self.nlp.parameters(problem), **bounds, **known
+        )
+        z, g = (np.array(found[key]).ravel() for key in ("x", "g"))
+        excess = np.maximum(bounds["lbg"] - g, g - bounds["ubg"]).max(initial=0.0)
+        path = self.nlp.unpack(z[: -self.count], problem)
+        multipliers = {"lam_x0": found["lam_x"], "lam_g0": found["lam_g"]}
+        return Relaxed(z[-self.count :], path, bool(np.isfinite(z).all() and excess <= MET), multipliers)
+
+
+def _sparse(matrix: np.ndarray) -> ca.DM:
+    return ca.sparsify(ca.DM(matrix))

@@ -1,0 +1,271 @@
+"""What one node, one step and the two ends contribute to the NLP, as small functions of few unknowns.
+
+An effect that looks only at time, position and mass acts once a node, with the node's whole weight;
+one that looks at the velocity acts in every step with that step's own velocities. Either way the
+rows add up to the discrete Euler-Lagrange equations of `mechanics`. Nothing here depends on the
+mesh, on units or on numbers that may change from solve to solve: what was written down once serves
+every mesh, and every problem of the same structure.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import casadi as ca
+
+from dmoc.basics.memory import kept
+from dmoc.motion.dynamics import (
+    Dynamics,
+    point_function,
+    split_effects,
+    step_momenta,
+    step_velocities,
+    weighted,
+)
+from dmoc.motion.lobatto import Scheme, scheme
+from dmoc.nlp.assembly import Kernel, kernel
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.rows import Row, with_symbols
+
+AXES = "xyz"
+ALL, FIRST, LAST = slice(None), slice(0, 1), slice(-1, None)
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """A kernel, and where its unknowns and rows stand on any mesh: (group, which of its entries).
+
+    It is evaluated at `every` "node", "step" or at both "ends" once; `limits` are the groups of
+    rows that nothing else adds to, as (name, kind, rows).
+    """
+
+    kernel: Kernel
+    every: str
+    unknowns: tuple[tuple[str, slice], ...]
+    numbers: tuple[str, ...]
+    targets: tuple[tuple[str, slice], ...]
+    limits: tuple[tuple[str, str, tuple[Row, ...]], ...]
+
+
+def formulas_of(problem: TransferProblem, order: int, hold: bool) -> Formulas:
+    """The formulas of a problem, written down once for all problems of the same structure."""
+    # their types beside the structure: a user's own may call its structure what it likes
+    same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
+    # dmoc's own have their numbers as symbols or as bounds
+    zones = [type(constraint) for constraint in problem.constraints]
+    shape = problem.dimension, problem.free_duration, order, hold
+    make = partial(_written, problem, scheme(order), hold)
+    return kept(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
+
+
+def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Formulas:
+    draft = _Formulas(problem, rule, hold)
+    return Formulas((draft.node(), draft.step(), draft.ends()), draft.parameters.numel())
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """The stencils of one structure of problem at one order, and how many parameters they have."""
+
+    stencils: tuple[Stencil, ...]
+    parameter_count: int
+
+
+class _Formulas:
+    """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
+
+    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
+        self.problem, self.rule, self.hold = problem, rule, hold
+        self.dynamics = Dynamics.of(problem)
+        self.origin, self.start_time = ca.SX.sym("origin", problem.dimension), ca.SX.sym("start_time")
+        self.mass = ca.SX.sym("mass")
+        head = [self.origin, self.start_time, self.mass]
+        if not problem.free_duration:
+            self.duration = ca.SX.sym("duration")
+            head.append(self.duration)
+        twins = [with_symbols(part, f"part_{i}") for i, part in enumerate(problem.adjustable_parts)]
+        self.parameters = ca.vertcat(*head, *[symbol for _, symbols in twins for symbol in symbols])
+        self.actuator, self.objective, self.start, self.goal, *self.constraints = [twin for twin, _ in twins]
+
+    def node(self) -> Stencil:
+        """Impulse, cost and limits of one node."""
+        draft, n = _Draft(self), self.problem.dimension
+        r = draft.take("position", n)
+        u = None if self.hold else draft.take("force", self.actuator.size(n))
+        m, duration = draft.mass(ALL), draft.duration()
+        fraction, weight = draft.number("fraction"), draft.number("weight")
+        t, q = self.start_time + fraction * duration, r + self.origin
+        resting, _ = split_effects(self.problem.effects, n)
+        dldq, _, push = point_function(resting, n, kinetic=False)(t, q, ca.DM.zeros(n), m)
+        push = push if u is None else push + self.actuator.force(u) / m
+        draft.add("dynamics", duration * weight * (dldq + push))
+        for i, constraint in enumerate(self.constraints):
+            draft.limit(_title(constraint, i), "node", constraint.rows(t, q, u, m))
+        if u is not None:
+            draft.limit("actuator", "control", self.actuator.rows(u))
+        if not self._cost_in_steps():
+            draft.cost = duration * weight * self._rate(t, q, ca.DM.zeros(n), u, m)
+        return draft.stencil("node")
+
+    def step(self) -> Stencil:
+        """Momenta of one step; cost and limits that look at its velocities or at a held control."""
+        rule, problem, n = self.rule, self.problem, self.problem.dimension
+        draft, size = _Draft(self), self.actuator.size(n)
+        # the j-th nodes of all steps; the nodes number steps times s, and one
+        nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
+        r = [draft.take("position", n, at) for at in nodes]
+        duration, costly = draft.duration(), self._cost_in_steps() or problem.actuator.burns
+        begin, length = draft.number("begin"), draft.number("length")
+        h, m = length * duration, [draft.mass(at) for at in nodes]
+        u: list = [None] * (rule.degree + 1)
+        if self.hold:
+            u = [draft.take("force", size)] * (rule.degree + 1)
+        elif costly:
+            u = [draft.take("force", size, at) for at in nodes]
+        push = [self.actuator.force(u[0]) / mass if self.hold else 0 for mass in m]
+        moving = point_function(split_effects(problem.effects, n)[1], n, kinetic=True)
+        t0 = self.start_time + begin * duration
+
+        def point(t, r, v, m):
+            return moving(t, r + self.origin, v, m)
+
+        for momentum, at in zip(step_momenta(rule, point, t0, h, r, m, push), nodes, strict=True):
+            draft.add("dynamics", momentum, at)
+        moves = [position - r[0] for position in r[1:]]
+        for i, constraint in enumerate(self.constraints):
+            at_gauss = [weighted(row[1:], moves) / h for row in rule.slopes_at(rule.gauss_points())]
+            rows = [
+                row._replace(name=str(g)) for g, v in enumerate(at_gauss) for row in constraint.speed_rows(v)
+            ]
+            draft.limit(_title(constraint, i), "step", rows)
+        if self.hold:
+            draft.limit("actuator", "control", self.actuator.rows(u[0]))
+        if problem.actuator.burns:
+            self._burn(draft, h, m, [self.actuator.flow(control) for control in u])
+        if self._cost_in_steps():
+            v = step_velocities(rule, h, r)
+            if self.hold:
+                v[0], v[-1] = self._end_velocities(t0, h, r, m, push)
+            rates = [
+                self._rate(t0 + c * h, r[j] + self.origin, v[j], u[j], m[j]) for j, c in enumerate(rule.points)
+            ]
+            draft.cost = h * weighted(rule.weights, rates)
+        return draft.stencil("step")
+
+    def _end_velocities(self, t0: Any, h: Any, r: list, m: list, push: list) -> tuple:
+        """Velocities at the ends of a step from its momenta.
+
+        Its mean velocity does not see a held force that alternates from step to step, and a cost of
+        it alone lets the force do so.
+        """
+
+        def point(t, r, v, m):
+            return self.dynamics.point(t, r + self.origin, v, m)
+
+        momenta = step_momenta(self.rule, point, t0, h, r, m, push)
+        ends = ((t0, r[0], -momenta[0], m[0]), (t0 + h, r[-1], momenta[-1], m[-1]))
+        first, last = (self.dynamics.velocity(t, q + self.origin, p, m) for t, q, p, m in ends)
+        return first, last
+
+    def _burn(self, draft: _Draft, h: Any, m: list, flow: list) -> None:
+        """Node masses by the Lobatto IIIA matrix A: m_i = m_0 - h sum_j A_ij flow_j, s rows a step.
+
+        The last row of A is the weights, so the mass used equals the quadrature of the flow exactly.
+        """
+        matrix = self.rule.integral
+        rows = [
+            Row(str(i), m[i] - m[0] + h * weighted(matrix[i], flow), 0.0, 0.0, "kg")
+            for i in range(1, len(matrix))
+        ]
+        draft.limit("mass_flow", "between", [rows[-1]._replace(name="")])
+        draft.limit("mass_inside", "step", rows[:-1])
+
+    def ends(self) -> Stencil:
+        """Momenta of the boundary states, conditions on them and the cost of the goal."""
+        draft, n = _Draft(self), self.problem.dimension
+        first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
+        v = {end: draft.take(f"{end}.velocity", n) for end in ("start", "goal")}
+        start_time, goal_time = self.start_time, self.start_time + draft.duration()
+        states = {
+            "start": (start_time, first, v["start"], draft.mass(FIRST)),
+            "goal": (goal_time, last, v["goal"], draft.mass(LAST)),
+        }
+        draft.add("dynamics", self.dynamics.point(*states["start"])[1], FIRST)
+        draft.add("dynamics", -self.dynamics.point(*states["goal"])[1], LAST)
+        for end, condition in (("start", self.start), ("goal", self.goal)):
+            draft.limit(f"{end}.condition", "end", condition.rows(*states[end]))
+            rows = [row for constraint in self.constraints for row in constraint.speed_rows(v[end])]
+            draft.limit(f"{end}.speed", "end", rows)
+        draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*states["goal"]))
+        return draft.stencil("ends")
+
+    def _rate(self, *state) -> Any:
+        return self.objective.sense * self.objective.rate(self.actuator, *state)
+
+    def _cost_in_steps(self) -> bool:
+        """Whether the running cost looks at the velocity or at a held control."""
+        n = self.problem.dimension
+        v, u = ca.SX.sym("v", n), ca.SX.sym("u", self.actuator.size(n))
+        rate = ca.SX(self._rate(ca.SX.sym("t"), ca.SX.sym("q", n), v, u, ca.SX.sym("m")))
+        return ca.depends_on(rate, v) or (self.hold and ca.depends_on(rate, u))
+
+
+class _Draft:
+    """The unknowns, numbers and rows of one stencil while it is being written down."""
+
+    def __init__(self, formulas: _Formulas):
+        self.formulas, self.cost = formulas, ca.SX(0)
+        self._symbols: list[ca.SX] = []
+        self._unknowns: list[tuple[str, slice]] = []
+        self._data: list[ca.SX] = []
+        self._numbers: list[str] = []
+        self._rows: list[ca.SX] = []
+        self._targets: list[tuple[str, slice]] = []
+        self._limits: list[tuple[str, str, tuple[Row, ...]]] = []
+
+    def take(self, group: str, size: int, at: slice = ALL) -> ca.SX:
+        """Symbols for some of the unknowns of a group."""
+        self._symbols.append(ca.SX.sym(group, size))
+        self._unknowns.append((group, at))
+        return self._symbols[-1]
+
+    def number(self, name: str) -> ca.SX:
+        """A symbol for a number that the mesh gives to each evaluation."""
+        self._data.append(ca.SX.sym(name))
+        self._numbers.append(name)
+        return self._data[-1]
+
+    def mass(self, at: slice) -> ca.SX:
+        """The mass at nodes: unknowns if it burns away, a parameter if not."""
+        return self.take("mass", 1, at) if self.formulas.problem.actuator.burns else self.formulas.mass
+
+    def duration(self) -> ca.SX:
+        """The duration: an unknown if it is free, a parameter if not."""
+        return self.take("duration", 1) if self.formulas.problem.free_duration else self.formulas.duration
+
+    def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:
+        """Add to rows of a group that others also add to."""
+        self._rows.append(rows)
+        self._targets.append((group, at))
+
+    def limit(self, name: str, kind: str, rows: Sequence[Row]) -> None:
+        """Rows of this stencil alone."""
+        if rows:
+            # the expressions are in the kernel
+            self._limits.append((name, kind, tuple(row._replace(expression=None) for row in rows)))
+            self.add(name, ca.vertcat(*[row.expression for row in rows]))
+
+    def stencil(self, every: str) -> Stencil:
+        given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.formulas.parameters
+        made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
+        places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)
+        return Stencil(made, every, *places, tuple(self._limits))
+
+
+def _title(constraint: Any, index: int) -> str:
+    """KeepOut, second in the list: keep_out_2."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", type(constraint).__name__).lower() + f"_{index + 1}"

@@ -1,0 +1,107 @@
+"""Time against expense over all points of a sweep, and what every panel of its figure shares."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dmoc.plots.style import PALE, PUSH, readable
+from dmoc.sweeps.data import result
+from dmoc.sweeps.plan import ordered
+
+if TYPE_CHECKING:
+    from xarray import DataArray, Dataset
+
+SUPERSCRIPTS = {"^2": "\u00b2", "^3": "\u00b3"}
+# A wider range than this is drawn on a logarithmic scale.
+WIDE = 30.0
+FRONT: dict[str, Any] = {
+    "color": PUSH,
+    "marker": "o",
+    "markersize": 7,
+    "fillstyle": "none",
+    "linestyle": (0, (2, 2)),
+    "label": "front: none is better in both",
+}
+
+
+def draw_front(axes: Any, data: Dataset, names: tuple[str, str]) -> None:
+    """Every point that passed its checks by duration and expense, and those that none beats in both."""
+    pair = [result(data, name) for name in names]
+    known = result(data, "checks_hold").values
+    scales = [readable(column.values, unit_of(column)) for column in pair]
+    x, y = (column.values[known] / size for column, (size, _) in zip(pair, scales, strict=True))
+    best = pareto(x, y)
+    other = next((name for name in data.coords if name != "duration" and ordered(data[name].values)), None)
+    if other is None:
+        axes.plot(x, y, "o", color=PALE, markersize=5, alpha=0.6, label="solved")
+    else:
+        size = readable(data[other].values, unit_of(data[other]))[0]
+        colours = data[other].broadcast_like(pair[0]).transpose(*pair[0].dims).values[known] / size
+        dots = axes.scatter(x, y, c=colours, cmap="cividis", s=30)
+        axes.figure.colorbar(dots, ax=axes, label=coordinate(data, other)[1])
+    axes.plot(x[best], y[best], **FRONT)
+    if wide(y):
+        axes.set_yscale("log")
+    axes.set_xlabel(f"duration [{pretty(scales[0][1])}]")
+    axes.set_ylabel(f"{names[1]} [{pretty(scales[1][1])}]")
+    axes.set_title(f"Time against {names[1]}")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12))
+
+
+def pareto(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The points that no other one beats or equals in both, by increasing x; less is better."""
+    order = np.lexsort((y, x))
+    lowest = np.minimum.accumulate(np.append(np.inf, y[order]))[:-1]
+    return order[y[order] < lowest]
+
+
+def front_axes(data: Dataset) -> tuple[str, str] | None:
+    """What stands for time and for expense, or None where there is no choice between them."""
+    known = result(data, "checks_hold").values
+    durations, burned = (result(data, name).values[known] for name in ("duration", "propellant"))
+    if durations.size < 3 or np.ptp(durations) < 1e-6 * durations.max():
+        return None
+    return "duration", "propellant" if burned.max() > 0 else "effort"
+
+
+def is_front_itself(data: Dataset, names: tuple[str, str]) -> bool:
+    """Whether the curve of the objective shows time against expense already."""
+    objective, expense = result(data, "objective"), result(data, names[1])
+    same = np.allclose(objective, expense, rtol=1e-6, equal_nan=True)
+    return bool(same) and objective.ndim == 1 and list(data.coords) == ["duration"]
+
+
+def coordinate(data: Dataset, name: Any) -> tuple[np.ndarray, str]:
+    """Where the values of a parameter stand on an axis, and what is written there."""
+    values, unit = data[name].values, unit_of(data[name])
+    if not ordered(values):
+        return np.arange(float(len(values))), str(name)
+    size, shown = readable(values, unit)
+    label = str(name).replace("_", " ")
+    return values / size, f"{label} [{pretty(shown)}]" if shown not in ("", "1") else label
+
+
+def along(axis: Any, data: Dataset, name: Any) -> np.ndarray:
+    """Write on an axis what stands along it; where the values of the parameter stand."""
+    places, label = coordinate(data, name)
+    axis.set_label_text(label)
+    if not ordered(data[name].values):
+        axis.set_ticks(places, [str(value) for value in data[name].values])
+    return places
+
+
+def wide(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0 and known.max() > WIDE * known.min())
+
+
+def unit_of(array: DataArray) -> str:
+    return str(array.attrs.get("units", ""))
+
+
+def pretty(unit: str) -> str:
+    for plain, raised in SUPERSCRIPTS.items():
+        unit = unit.replace(plain, raised)
+    return unit

@@ -1,0 +1,219 @@
+"""Pictures of a solution: the path, the force, the speed and the energy, on one page."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dmoc.basics.arguments import of_kind
+from dmoc.basics.files import path_of, whole_file
+from dmoc.plots.ledger import draw_ledger
+from dmoc.plots.path import burning, draw_path, entries_once, is_wide
+from dmoc.plots.style import (
+    AXIS_COLOURS,
+    AXIS_LINES,
+    DARK,
+    PALE,
+    PATH,
+    PUSH,
+    SETTINGS,
+    WARNING,
+    readable,
+    speeds,
+    within_steps,
+)
+from dmoc.results.solution import Solution
+from dmoc.scene.constraints import SpeedLimit
+from dmoc.scene.engines import Nozzles
+from dmoc.scene.objectives import Objective, Time
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from dmoc.checks.verification import Report
+
+SUFFIXES = (".png", ".pdf", ".svg")
+SQUARED = "\u00b2"
+# A limit so many times the largest force would flatten the curves: its number stands in the legend.
+FAR = 6.0
+LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
+
+
+def save_figure(
+    solution: Solution, path: str | os.PathLike, report: Report | None = None, dpi: float = 150
+) -> None:
+    """Draw a solution into a file, whole or not at all.
+
+    Parameters
+    ----------
+    solution : Solution
+    path : path
+        Ends in .png, .pdf or .svg, which decides the format.
+    report : Report, optional
+        Checks whose outcome is written below the panels.
+    dpi : float
+        Dots per inch of a .png; the page is 13.33 inches wide.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another one or the folder does not exist.
+    """
+    of_kind("solution", solution, Solution)
+    if path_of(path).suffix.lower() not in SUFFIXES:
+        raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+    page = figure(solution, report)
+    with whole_file(path) as temporary:
+        page.savefig(temporary, dpi=dpi)
+
+
+def figure(solution: Solution, report: Report | None = None) -> Figure:
+    """A matplotlib Figure of a solution: path, force, speed, and energy or momentum.
+
+    Zones, attractors and limits are drawn where the solution holds its problem.
+
+    Parameters
+    ----------
+    solution : Solution
+    report : Report, optional
+        Checks whose outcome is written below the panels.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(SETTINGS):
+        page = Figure(figsize=(13.33, 7.5))
+        # the layout does not see the label of the z axis
+        page.set_layout_engine(
+            "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
+        )
+        wide = is_wide(solution)
+        path, panels = _panels(page, solution.dimension, wide)
+        draw_path(path, solution, beside=wide)
+        size, unit = time_axis = readable(solution.end_times, "s")
+        for panel, draw in zip(panels, (_draw_force, _draw_speed, draw_ledger), strict=True):
+            draw(panel, solution, size)
+            _shade_burns(panel, solution, size)
+            where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.05)}
+            if wide:
+                where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.3), "ncol": 2}
+            panel.legend(*entries_once(panel), borderaxespad=0.0, **where)
+            panel.sharex(panels[0])
+            panel.tick_params(labelbottom=wide or panel is panels[-1])
+        for panel in panels if wide else panels[-1:]:
+            panel.set_xlabel(f"time [{unit}]")
+        if not wide:
+            page.align_ylabels(panels)
+        page.suptitle(_headline(solution, *time_axis), fontsize=16, color=DARK if solution.success else WARNING)
+        words, good = _footnote(solution, report)
+        page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
+    return page
+
+
+def _panels(page: Figure, dimension: int, wide: bool) -> tuple[Any, list[Any]]:
+    """The path panel on the left, or above if it is wide, and those over time."""
+    if wide:
+        grid = page.add_gridspec(2, 3, height_ratios=(1.5, 1.0))
+        return page.add_subplot(grid[0, :]), [page.add_subplot(grid[1, column]) for column in range(3)]
+    grid = page.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+    path = page.add_subplot(grid[:, 0], projection="3d" if dimension == 3 else None)
+    return path, [page.add_subplot(grid[row, 1]) for row in range(3)]
+
+
+def _shade_burns(axes: Any, solution: Solution, late: float) -> None:
+    """Shade when an engine that also coasts is on."""
+    if (on := burning(solution)) is None:
+        return
+    times = solution.end_times if solution.hold else solution.time
+    on, step = (np.append(on, False), "post") if solution.hold else (on, None)
+    style = {"transform": axes.get_xaxis_transform(), "color": PUSH, "alpha": 0.18, "linewidth": 0, "zorder": 0}
+    axes.fill_between(times / late, 0, 1, where=on, step=step, **style).set_gid("engine on")
+
+
+def _draw_force(axes: Any, solution: Solution, late: float) -> None:
+    size, unit = readable(solution.force, "N")
+    times, force = solution.end_times, solution.force
+    if not solution.hold:
+        times, force = within_steps(solution, force)
+    curves = [
+        (f"$F_{axis}$", force[:, i], AXIS_COLOURS[i], AXIS_LINES[i])
+        for i, axis in enumerate("xyz"[: solution.dimension])
+    ]
+    if solution.dimension > 1:
+        curves.append(("$|F|$", np.linalg.norm(force, axis=1), DARK, (0, (1, 1))))
+    for name, values, colour, line in curves:
+        style = {"color": colour, "linestyle": line, "label": name, "linewidth": 1.8}
+        if solution.hold:
+            axes.stairs(values / size, times / late, baseline=None, **style)
+        else:
+            axes.plot(times / late, values / size, **style)
+    _draw_force_limits(axes, solution, size, unit)
+    axes.set_ylabel(f"force [{unit}]")
+    axes.set_title("Force of the actuator" + (", held over each step" if solution.hold else ""))
+
+
+def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) -> None:
+    if solution.problem is None:
+        return
+    actuator, n = solution.problem.actuator, solution.dimension
+    levels, words = np.array([actuator.force_limit() or np.inf]), "limit"
+    if actuator.labels(n)[:n] == tuple("xyz"[:n]):
+        sides = np.unique(np.concatenate([side[:n] for side in actuator.bounds(n)]))
+        if np.isfinite(sides).any():
+            levels, words = sides, "limit" if n == 1 else "limit of\na component"
+    elif isinstance(actuator, Nozzles):
+        words = "limit of\na nozzle"
+    largest = np.abs(solution.force).max(initial=0.0)
+    for level in levels[np.isfinite(levels)]:
+        if abs(level) < FAR * largest:
+            axes.axhline(level / size, label=words, **LIMIT)
+        else:
+            axes.plot([], [], label=f"{words}\n{abs(level) / size:.3g} {unit}", **LIMIT)
+
+
+def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
+    times, speed = speeds(solution)
+    size, unit = readable(speed, "m/s")
+    axes.plot(times / late, speed / size, color=PATH, label="speed")
+    for limit in solution.problem.constraints if solution.problem else ():
+        if isinstance(limit, SpeedLimit):
+            axes.axhline(limit.limit / size, label="limit", **LIMIT)
+    if np.nanmin(speed) < 0.5 * np.nanmax(speed):
+        # above that the changes are what there is to see
+        axes.set_ylim(bottom=0)
+    axes.set_ylabel(f"speed [{unit}]")
+    axes.set_title("Speed")
+
+
+def _headline(solution: Solution, late: float, late_unit: str) -> str:
+    """What was found, with times in the unit of the time axis."""
+    about, problem = solution.provenance, solution.problem
+    name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
+    if not solution.success:
+        return f"{name}NOT SOLVED ({solution.status}), the last iterate"
+    kind = "objective" if problem is None else _wanted(problem.objective)
+    size, unit = (late, late_unit) if about.objective_unit == "s" else (1.0, about.objective_unit)
+    words = f"{name}{kind} {solution.objective / size:.6g} {unit.replace('^2', SQUARED)}"
+    if not problem or not isinstance(problem.objective, Time):
+        words += f", duration {solution.duration / late:.6g} {late_unit}"
+    told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
+    return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"
+
+
+def _wanted(objective: Objective) -> str:
+    """Such as `least effort` or `greatest final mass`."""
+    return f"{'least' if objective.sense > 0 else 'greatest'} {objective.label}"
+
+
+def _footnote(solution: Solution, report: Report | None) -> tuple[str, bool]:
+    """One line on numerics and checks, and whether all is well."""
+    spent = solution.build_s + solution.solve_s
+    mesh = f"order {solution.order}, {solution.steps} steps, {solution.iterations} iterations, {spent:.2g} s"
+    scene = "" if solution.problem else "; problem not attached: zones and limits are not shown"
+    if report is None:
+        return mesh + scene, True
+    failed = [check.name for check in report.checks if not check.ok]
+    words = f"checks failed: {', '.join(failed)}" if failed else f"all {len(report.checks)} checks hold"
+    return f"{mesh}; {words}{scene}", not failed

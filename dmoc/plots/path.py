@@ -1,0 +1,191 @@
+"""The path panel: where the body goes, what pulls it, where it must not be, and where it is pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dmoc.plots.scene import Corners, draw_scene, view_of
+from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
+from dmoc.results.solution import Solution
+from dmoc.scene.constraints import KeepIn, KeepOut
+from dmoc.scene.engines import Engine, Nozzles
+
+MOST_DOTS = 40
+ARROWS = 20
+# Length of the longest force arrow, as a part of the extent.
+ARROW = 0.12
+# From this width on, over the height, a plane path gets a panel over the whole page.
+WIDE = 2.5
+
+
+def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
+    """Path in the plane or in space, or position against time in one dimension; the legend below or beside."""
+    if solution.dimension == 1:
+        _draw_line(axes, solution)
+        return
+    size, unit = readable(np.ptp(solution.position, axis=0), "m")
+    path = within_steps(solution, solution.position)[1] / size
+    tails, arrows, longest = _arrows(solution)
+    low, high = _view(solution)
+    view = low / size, high / size
+    proxies = draw_scene(axes, solution, view, size)
+    _mark_burns(axes, solution, solution.position.T / size)
+    axes.plot(*path.T, color=PATH, label="path", zorder=3)
+    if solution.steps <= MOST_DOTS:
+        ends = solution.position[:: solution.order // 2] / size
+        axes.plot(*ends.T, ".", color=PATH, label="step ends", zorder=3)
+    proxies += _draw_arrows(axes, tails / size, arrows / size, longest)
+    _mark_ends(axes, path[:1].T, path[-1:].T)
+    if solution.dimension == 3:
+        floor = np.full(len(path), view[0][2])
+        axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label="its shadow", zorder=0)
+        # drawn by the order given, else the path would hide behind what it passes in front of
+        axes.computed_zorder = False
+    _frame(axes, view, unit)
+    _legend(axes, proxies, beside)
+
+
+def is_wide(solution: Solution) -> bool:
+    """Whether a path in the plane and its surroundings are much wider than high."""
+    spans = np.subtract(*_view(solution)[::-1])
+    return solution.dimension == 2 and bool(spans[0] > WIDE * spans[1])
+
+
+def _view(solution: Solution) -> Corners:
+    tails, arrows, _ = _arrows(solution)
+    return view_of(solution, np.concatenate([solution.position, tails + arrows]))
+
+
+def burning(solution: Solution) -> np.ndarray | None:
+    """Where an engine that also coasts is on: a value a node, or a step if held; None for what never coasts."""
+    strength = np.linalg.norm(solution.force, axis=1)
+    on = strength > 0.02 * strength.max(initial=0.0)
+    switches = solution.problem is not None and isinstance(solution.problem.actuator, (Engine, Nozzles))
+    return on if switches and on.any() and not on.all() else None
+
+
+def _mark_burns(axes: Any, solution: Solution, curve: np.ndarray) -> None:
+    """A broad line under the curve of the nodes where the engine is on."""
+    if (on := burning(solution)) is None:
+        return
+    if solution.hold:
+        on = np.append(np.repeat(on, solution.order // 2), False)
+    shown = np.where(on, curve, np.nan)
+    axes.plot(*shown, color=PUSH, linewidth=7, alpha=0.4, solid_capstyle="butt", label="engine on", zorder=2)
+
+
+def _draw_line(axes: Any, solution: Solution) -> None:
+    times, path = within_steps(solution, solution.position)
+    (late, unit_late), (size, unit) = readable(times, "s"), readable(path, "m")
+    for zone in solution.problem.constraints if solution.problem else ():
+        if isinstance(zone, KeepOut):
+            low, high = zone.center[0] - zone.radius, zone.center[0] + zone.radius
+            axes.axhspan(low / size, high / size, color=FORBIDDEN, alpha=0.3, label="keep-out zone")
+        elif isinstance(zone, KeepIn):
+            for edge in (edge for edge in (*zone.lower, *zone.upper) if np.isfinite(edge)):
+                axes.axhline(edge / size, color=FORBIDDEN, linestyle="--", label="keep-in zone")
+    _mark_burns(axes, solution, np.array([solution.time / late, solution.position[:, 0] / size]))
+    axes.plot(times / late, path[:, 0] / size, color=PATH, label="position")
+    _mark_ends(axes, (times[:1] / late, path[:1, 0] / size), (times[-1:] / late, path[-1:, 0] / size))
+    axes.set(xlabel=f"time [{unit_late}]", ylabel=f"x [{unit}]")
+    axes.set_title("Position")
+    _legend(axes, [])
+
+
+def _mark_ends(axes: Any, start: Any, goal: Any) -> None:
+    style = {"linestyle": "none", "markerfacecolor": "white", "markeredgecolor": DARK, "zorder": 6}
+    axes.plot(*start, marker="o", markersize=10, label="start", **style)
+    axes.plot(*goal, marker="*", markersize=17, label="goal", **style)
+
+
+def _arrows(solution: Solution) -> tuple[np.ndarray, np.ndarray, float]:
+    """Tails and arrows [m] of the force at a few places along the path, and the largest force there [N]."""
+    places, force = solution.position, solution.force
+    if solution.hold:
+        ends = places[:: solution.order // 2]
+        places = 0.5 * (ends[1:] + ends[:-1])
+    if (on := burning(solution)) is not None:
+        # coasting has nothing to show, and a burn may be short
+        places, force = places[on], force[on]
+    few = np.unique(np.linspace(0, len(force) - 1, ARROWS).round().astype(int))
+    places, force = places[few], force[few]
+    strength = np.linalg.norm(force, axis=1)
+    longest = float(strength.max(initial=0.0))
+    extent = float(np.linalg.norm(np.ptp(solution.position, axis=0)))
+    seen = strength > 0.02 * longest
+    return places[seen], force[seen] * (ARROW * extent / (longest or 1.0)), longest
+
+
+def _draw_arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: float) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    if not len(tails):
+        return []
+    if tails.shape[1] == 2:
+        style = {
+            "angles": "xy",
+            "scale_units": "xy",
+            "scale": 1.0,
+            "units": "inches",
+            "width": 0.03,
+            "zorder": 4,
+        }
+    else:
+        style = {"arrow_length_ratio": 0.3, "linewidth": 1.5, "zorder": 4}
+    axes.quiver(*tails.T, *arrows.T, color=PUSH, **style).set_gid("force")
+    unit_size, unit = readable(longest, "N")
+    words = f"force, longest {longest / unit_size:.3g} {unit}"
+    return [Line2D([], [], color=PUSH, marker=">", markersize=7, label=words)]
+
+
+def _frame(axes: Any, view: Corners, unit: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    names = "xyz"[: len(view[0])]
+    axes.set(**{f"{name}label": f"{name} [{unit}]" for name in names})
+    axes.set_title("Path", loc="left")
+    if len(names) == 2:
+        # limits that are not fixed let the equal scales fill the panel
+        axes.dataLim.set_points(np.array(view))
+        axes.set(xmargin=0, ymargin=0)
+        axes.set_aspect("equal", adjustable="datalim")
+        return
+    spans = view[1] - view[0]
+    tall = spans[2] > 0.9 * spans[:2].max()
+    for i, name in enumerate(names):
+        axis = getattr(axes, f"{name}axis")
+        axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
+        # a short side has room for few numbers
+        axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
+        # matplotlib measures this distance along the other two sides; make it the same for all three
+        least = 9.0 if name == "z" and not tall else 12.0
+        axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, least)
+    for artist in (*axes.lines, *axes.collections):
+        # the enlarged box reaches beyond the rectangle that would clip it; only its sides are laid out
+        artist.set_clip_on(False)
+        artist.set_in_layout(False)
+    # a tall box would reach into the legend below
+    axes.set_box_aspect(spans, zoom=0.88 if tall else 1.07)
+    axes.set_anchor("N")
+    axes.view_init(elev=25, azim=-60)
+
+
+def _legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
+    """Below the panel, or to its right."""
+    handles, labels = entries_once(axes, proxies)
+    if beside:
+        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        return
+    columns = 3 if len(labels) > 4 else 4
+    below = -0.06 if axes.name == "3d" else -0.11
+    axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
+
+
+def entries_once(axes: Any, more: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:
+    """Handles and labels for a legend, each label once."""
+    handles, labels = axes.get_legend_handles_labels()
+    entries = dict(zip(labels, handles, strict=True)) | {handle.get_label(): handle for handle in more}
+    return list(entries.values()), list(entries)

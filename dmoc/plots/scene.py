@@ -1,0 +1,149 @@
+"""The surroundings of a path: what pulls, what is forbidden, and how much of it is in view."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from dmoc.effects.gravity import J2, PointGravity
+from dmoc.plots.style import ATTRACTOR, DARK, FORBIDDEN
+from dmoc.results.solution import Solution
+from dmoc.scene.constraints import ApproachCone, KeepIn, KeepOut
+
+# How far beyond the path zones are shown, as a part of the extent.
+REACH = 0.5
+
+Corners = tuple[np.ndarray, np.ndarray]
+
+
+def view_of(solution: Solution, drawn: np.ndarray) -> Corners:
+    """Corners [m] of what is shown: points of the path and its arrows, and the scene near them."""
+    # the last iterate of a failed solve may hold anything
+    drawn = drawn[np.isfinite(drawn).all(axis=1)]
+    low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else np.zeros((2, solution.dimension))
+    extent = float((high - low).max()) or 1.0
+    near, far = low - REACH * extent, high + REACH * extent
+    for zone in solution.problem.constraints if solution.problem else ():
+        if isinstance(zone, KeepIn):
+            # walls far away would make the path a dot, and what lies behind near ones does not matter
+            walls = [np.array(side) for side in (zone.lower, zone.upper)]
+            low, high = (
+                np.where((w > near) & (w < far), w, end) for w, end in zip(walls, (low, high), strict=True)
+            )
+            near, far = np.maximum(near, walls[0]), np.minimum(far, walls[1])
+    for corner, opposite in _boxes(solution):
+        if (opposite > near).all() and (corner < far).all():
+            low, high = np.minimum(low, np.maximum(corner, near)), np.maximum(high, np.minimum(opposite, far))
+    return low - 0.05 * extent, high + 0.05 * extent
+
+
+def _boxes(solution: Solution) -> list[Corners]:
+    """Opposite corners of attractors, spheres and cones [m]."""
+    boxes = [(center - radius, center + radius) for center, radius in _attractors(solution)]
+    for zone in solution.problem.constraints if solution.problem else ():
+        if isinstance(zone, KeepOut):
+            center = np.array(zone.center)
+            boxes.append((center - zone.radius, center + zone.radius))
+        elif isinstance(zone, ApproachCone):
+            rim = _cone(solution, zone).reshape(solution.dimension, -1)
+            boxes.append((rim.min(axis=1), rim.max(axis=1)))
+    return boxes
+
+
+def _attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
+    """Centres of the point masses and their radii where the scene tells them [m], else 0."""
+    effects = solution.problem.effects if solution.problem else ()
+    radius = max((effect.radius for effect in effects if isinstance(effect, J2)), default=0.0)
+    return [
+        (np.zeros(solution.dimension), radius) if effect.center is None else (np.array(effect.center), 0.0)
+        for effect in effects
+        if isinstance(effect, PointGravity)
+    ]
+
+
+def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> list[Any]:
+    """Draw what is forbidden and what attracts; further entries for the legend."""
+    from matplotlib.patches import Patch
+
+    proxies = []
+    for zone in solution.problem.constraints if solution.problem else ():
+        if isinstance(zone, KeepOut):
+            _draw_ball(axes, np.array(zone.center) / size, zone.radius / size, view, FORBIDDEN, "keep-out zone")
+            proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label="keep-out zone"))
+        elif isinstance(zone, KeepIn):
+            _draw_room(axes, np.array(zone.lower) / size, np.array(zone.upper) / size, view)
+        elif isinstance(zone, ApproachCone):
+            _draw_cone(axes, _cone(solution, zone) / size)
+    largest = max((effect.mu for effect in _pulls(solution)), default=1.0)
+    for (center, radius), effect in zip(_attractors(solution), _pulls(solution), strict=True):
+        if radius:
+            _draw_ball(axes, center / size, radius / size, view, ATTRACTOR, "attractor")
+            proxies.append(Patch(facecolor=ATTRACTOR, edgecolor=DARK, alpha=0.5, label="attractor"))
+        elif (center / size > view[0]).all() and (center / size < view[1]).all():
+            style = {"linestyle": "none", "marker": "o", "markerfacecolor": ATTRACTOR, "markeredgecolor": DARK}
+            across = 13 if effect.mu == largest else 9
+            axes.plot(*(center[:, None] / size), markersize=across, label="attractor", **style)
+    return proxies
+
+
+def _pulls(solution: Solution) -> list[PointGravity]:
+    return [e for e in (solution.problem.effects if solution.problem else ()) if isinstance(e, PointGravity)]
+
+
+def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colour: str, name: str) -> None:
+    """A disc in the plane, a shaded sphere in space."""
+    from matplotlib.colors import LightSource
+    from matplotlib.patches import Circle
+
+    if len(center) == 2:
+        disc = Circle(tuple(center), radius, facecolor=colour, edgecolor=colour, alpha=0.4)
+        disc.set_gid(name)
+        axes.add_patch(disc)
+        return
+    # the poles are left out: a triangle without area has no shade
+    around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 31), np.linspace(1e-3, np.pi - 1e-3, 16))
+    unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
+    surface = center[:, None, None] + radius * unit
+    # axes in space do not clip
+    inside = np.all([(s >= a) & (s <= b) for s, a, b in zip(surface, *view, strict=True)], axis=0)
+    surface = np.where(inside, surface, np.nan)
+    light = LightSource(azdeg=225, altdeg=50)
+    style = {"color": colour, "alpha": 0.35, "linewidth": 0, "lightsource": light, "zorder": 1}
+    axes.plot_surface(*surface, **style).set_gid(name)
+
+
+def _cone(solution: Solution, zone: ApproachCone) -> np.ndarray:
+    """Points of a cone from the tip to as deep as the path goes [m], shape (axes, depths, around)."""
+    axis, apex = np.array(zone.axis), np.array(zone.apex)
+    depth = float(np.nanmax((solution.position - apex) @ axis, initial=0.0))
+    # directions across the axis: two in space, in the plane one and back
+    across = np.linalg.svd(axis[None])[2][1:]
+    around = np.linspace(0, 2 * np.pi, 3 if len(axis) == 2 else 37)
+    circle = np.stack([np.cos(around), np.sin(around)])[: len(across)].T @ across
+    slope = axis + np.tan(zone.half_angle) * circle
+    return apex[:, None, None] + depth * np.linspace(0, 1, 9)[None, :, None] * slope.T[:, None, :]
+
+
+def _draw_cone(axes: Any, surface: np.ndarray) -> None:
+    style = {"color": FORBIDDEN, "linestyle": "--", "linewidth": 1.2, "label": "approach cone"}
+    if len(surface) == 3:
+        axes.plot_surface(*surface, color=FORBIDDEN, alpha=0.12, linewidth=0, zorder=1).set_gid("approach cone")
+        axes.plot(*surface[:, -1, :], **style)
+    for side in np.linspace(0, surface.shape[2] - 1, 5 if len(surface) == 3 else 3).astype(int)[:-1]:
+        axes.plot(*surface[:, :, side], **style)
+
+
+def _draw_room(axes: Any, lower: np.ndarray, upper: np.ndarray, view: Corners) -> None:
+    """The edges of a box, as far as they are in view."""
+    n = len(lower)
+    for along in range(n):
+        others = [axis for axis in range(n) if axis != along]
+        span = max(lower[along], view[0][along]), min(upper[along], view[1][along])
+        for corner in product(*[(lower[axis], upper[axis]) for axis in others]):
+            if not all(view[0][axis] < c < view[1][axis] for axis, c in zip(others, corner, strict=True)):
+                continue
+            edge = np.empty((n, 2))
+            edge[along], edge[others] = span, np.array(corner)[:, None]
+            axes.plot(*edge, color=FORBIDDEN, linestyle="--", label="keep-in zone")

@@ -1,0 +1,92 @@
+"""What all panels of a figure share: colours, units that read well, curves between the nodes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import step_nodes
+from dmoc.results.solution import Solution
+
+# Okabe and Ito's palette, which stays apart under the common kinds of colour blindness.
+AXIS_COLOURS = ("#0072B2", "#D55E00", "#009E73")
+AXIS_LINES = ("-", (0, (5, 2)), (0, (4, 1.5, 1, 1.5)))
+DARK, PALE = "#222222", "#808080"
+PATH, PUSH, FORBIDDEN, ATTRACTOR = "#0072B2", "#E69F00", "#CC79A7", "#F0E442"
+WARNING = "#B03A00"
+
+SETTINGS: Any = {
+    "text.usetex": False,
+    "font.family": "sans-serif",
+    "font.size": 12,
+    "axes.titlesize": 13,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 12,
+    "xtick.labelsize": 11,
+    "ytick.labelsize": 11,
+    "legend.fontsize": 11,
+    "legend.frameon": False,
+    "lines.linewidth": 1.8,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.use_mathtext": True,
+    "axes.formatter.limits": (-3, 5),
+}
+
+# Other units in which a number reads better: the least value drawn in them and their size, largest first.
+_UNITS = {
+    "s": ((3 * 86400.0, 86400.0, "days"), (3 * 3600.0, 3600.0, "h")),
+    "m": ((1e4, 1e3, "km"),),
+    "m/s": ((1e4, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
+    "N": ((1e4, 1e3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e-3, "mN")),
+    "J": ((1e10, 1e9, "GJ"), (1e7, 1e6, "MJ"), (1e4, 1e3, "kJ"), (1e-2, 1.0, "J"), (0.0, 1e-3, "mJ")),
+    "J/kg": ((1e7, 1e6, "MJ/kg"), (1e4, 1e3, "kJ/kg")),
+}
+
+
+def readable(values: Any, unit: str) -> tuple[float, str]:
+    """(size of the unit to draw in, its name) for values given in SI."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    choices = _UNITS.get(unit, ()) if largest else ()
+    return next(((size, name) for least, size, name in choices if largest >= least), (1.0, unit))
+
+
+def within_steps(solution: Solution, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values along the polynomial of every step, from values at the nodes.
+
+    At order 2 these are straight lines from node to node, and the nodes are enough.
+    """
+    rule = scheme(solution.order)
+    if rule.degree == 1:
+        return solution.time, values
+    fractions = np.linspace(0.0, 1.0, int(np.clip(600 // solution.steps, 2 * rule.degree, 30)))
+    nodes = values[step_nodes(solution.steps, rule)]
+    fine = np.einsum("pj,jkn->kpn", rule.values_at(fractions), nodes)
+    return _times(solution, fractions), fine.reshape(-1, values.shape[1])
+
+
+def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and speeds [m/s] at the step ends, and above order 2 at the Gauss points between.
+
+    Elsewhere inside a step the derivative of its polynomial is less accurate than the path.
+    """
+    rule, times, velocity = scheme(solution.order), solution.end_times, solution.velocity
+    if rule.degree > 1:
+        points = rule.gauss_points()
+        nodes = solution.position[step_nodes(solution.steps, rule)]
+        h = np.diff(solution.end_times)[:, None, None]
+        inside = np.einsum("pj,jkn->kpn", rule.slopes_at(points), nodes - nodes[0]) / h
+        times = np.append(times, _times(solution, points))
+        velocity = np.concatenate([velocity, inside.reshape(-1, solution.dimension)])
+    order = np.argsort(times, kind="stable")
+    return times[order], np.linalg.norm(velocity, axis=1)[order]
+
+
+def _times(solution: Solution, fractions: np.ndarray) -> np.ndarray:
+    """Times of the same fractions of every step [s]."""
+    ends = solution.end_times
+    return (ends[:-1, None] + np.diff(ends)[:, None] * fractions).ravel()

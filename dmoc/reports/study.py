@@ -1,0 +1,99 @@
+"""What a person sees of a study: a line a solve, and what each accuracy costs; JSON and CSV of the same."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from dmoc.basics.files import whole_file
+from dmoc.studies.accuracy import TARGETS, Trial, time_to_reach
+
+FIGURES = ("error", "goal missed", "iterations", "calls", "build", "solve")
+# Terminals narrower than this get a table without nodes and calls.
+WIDE = 92
+
+
+def study_tables(trials: Sequence[Trial], unit: str, width: int = WIDE) -> RenderableType:
+    """Every solve, then the time to reach each accuracy."""
+    solves = Text("Solves: relative errors, medians of the times", "bold")
+    reach = Text("Milliseconds to a relative error of the objective (build and solve)", "bold")
+    note = "interpolated between measured solves, never beyond them; - where not reached"
+    return Group(solves, _solves(trials, unit, width), Text(), reach, _reach(trials), Text(note, "dim"))
+
+
+def study_object(name: str, trials: Sequence[Trial]) -> dict[str, Any]:
+    """The JSON object of a study; numbers that are not finite become null."""
+    rows = [
+        {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row}
+        for row in (asdict(trial).items() for trial in trials)
+    ]
+    reach = [
+        {"method": method, "seconds": dict(zip(map(_power, TARGETS), seconds, strict=True))}
+        for method, seconds in time_to_reach(trials).items()
+    ]
+    return {"problem": name, "trials": rows, "time_to_reach": reach}
+
+
+def write_csv(trials: Sequence[Trial], path: Path) -> None:
+    """One line a solve, whole or not at all."""
+    with whole_file(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Trial)])
+        writer.writeheader()
+        writer.writerows(asdict(trial) for trial in trials)
+
+
+def _solves(trials: Sequence[Trial], unit: str, width: int) -> Table:
+    rows = [_cells(trial) for trial in trials]
+    names = [name for name in rows[0] if width >= WIDE or name not in ("nodes", "calls")] if rows else []
+    units = {"objective": unit, "build": "ms", "solve": "ms"}
+    heads = [name.replace(" ", "\n") + (f"\n[{units[name]}]" if name in units else "") for name in names]
+    table = _table(heads)
+    before = ""
+    for row in rows:
+        shown = row | {"method": "" if row["method"] == before else row["method"]}
+        table.add_row(*[shown[name] for name in names])
+        before = row["method"]
+    return table
+
+
+def _cells(trial: Trial) -> dict[str, str]:
+    cells = {"method": trial.method, "steps": str(trial.steps), "nodes": str(trial.nodes)}
+    if trial.status != "solved":
+        reason = trial.status.split(":")[0]
+        return cells | {"objective": reason} | dict.fromkeys(FIGURES, "-")
+    values = (
+        f"{trial.error:.1e}",
+        f"{trial.path_error:.1e}",
+        str(trial.iterations),
+        str(trial.calls),
+        f"{1e3 * trial.build_s:.1f}",
+        f"{1e3 * trial.solve_s:.1f}",
+    )
+    return cells | {"objective": f"{trial.objective:.8g}"} | dict(zip(FIGURES, values, strict=True))
+
+
+def _reach(trials: Sequence[Trial]) -> Table:
+    table = _table(["method", *map(_power, TARGETS)])
+    for method, times in time_to_reach(trials).items():
+        table.add_row(method, *["-" if seconds is None else f"{1e3 * seconds:.3g}" for seconds in times])
+    return table
+
+
+def _power(target: float) -> str:
+    """1e-03 as 1e-3."""
+    return f"1e{round(math.log10(target))}"
+
+
+def _table(columns: Sequence[str]) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i else "left", no_wrap=True)
+    return table

@@ -1,0 +1,269 @@
+"""What a person sees: a scene in words, the ladder of meshes, the table of checks."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from dmoc.basics.docstrings import documented, first_line
+
+if TYPE_CHECKING:
+    from dmoc.checks.verification import Report
+    from dmoc.effects.base import Effect
+    from dmoc.motion.march import Trajectory
+    from dmoc.nlp.transcription import NLP
+    from dmoc.results.solution import Solution
+    from dmoc.scene.problem import TransferProblem
+    from dmoc.scene.problem_file import Parameter
+
+# Width of what is written to a file or a pipe, where no terminal gives one.
+PLAIN_WIDTH = 120
+# The live line is redrawn at most this often [s]: drawing must not slow the solve down.
+REDRAW = 0.1
+
+
+def console(stderr: bool = False) -> Console:
+    """A console without markup: units stand in square brackets."""
+    stream = sys.stderr if stderr else sys.stdout
+    wide = None if stream.isatty() or "COLUMNS" in os.environ else PLAIN_WIDTH
+    return Console(file=stream, markup=False, highlight=False, emoji=False, width=wide)
+
+
+def scene(problem: TransferProblem) -> RenderableType:
+    """What is to be done, in words."""
+    shortest, longest = problem.duration_bounds
+    free = f"free between {shortest:g} and {longest:g} s"
+    return pairs(
+        [
+            ("body", f"{problem.mass:g} kg, axes {', '.join('xyz'[: problem.dimension])}"),
+            ("start", problem.start.words()),
+            ("goal", problem.goal.words()),
+            ("duration", free if problem.free_duration else f"{shortest:g} s"),
+            ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
+            ("actuator", problem.actuator.words()),
+            ("objective", problem.objective.words().rstrip(".")),
+            ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
+        ]
+    )
+
+
+def prose(docstring: str) -> str:
+    """A docstring whose paragraphs may be broken anew; indented lines stay as they are."""
+    return re.sub(r"(?<=\S)\n(?=\S)", " ", docstring)
+
+
+def effect_words(effect: Effect) -> str:
+    """One line for a person: what the effect's docstring says it is, and its numbers with units."""
+    if hasattr(effect, "words"):
+        return effect.words()
+    name, docstring = type(effect).__name__, type(effect).__doc__
+    summary = first_line(docstring)
+    # a dataclass without a docstring has its signature there
+    summary = "" if summary.startswith(f"{name}(") else summary.split(":")[0].rstrip(".")
+    entries = documented(docstring)
+    numbers = [name]
+    for name in [field.name for field in fields(effect)] if is_dataclass(effect) else ():
+        value = getattr(effect, name)
+        if value is not None:
+            numbers.append(f"{name} {value_words(value, entries[name].unit if name in entries else '')}")
+    return f"{summary} ({', '.join(numbers)})" if summary else ", ".join(numbers)
+
+
+def value_words(value: Any, unit: str = "") -> str:
+    """A number or a tuple of numbers with its unit; anything else by its name."""
+    if isinstance(value, (tuple, list)):
+        text = "(" + ", ".join(value_words(entry) for entry in value) + ")"
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        text = f"{value:.10g}"
+    else:
+        text = getattr(value, "__name__", None) or str(value)
+    return f"{text} {unit}" if unit and unit not in ("-", "1") else text
+
+
+def parameters(entries: Sequence[Parameter]) -> RenderableType:
+    """The parameters of a problem file with defaults and units."""
+    table = _table("parameter", "default", "unit", "what it is")
+    for entry in entries:
+        default = value_words(entry.default) if not isinstance(entry.default, str) else repr(entry.default)
+        table.add_row(entry.name, default, entry.unit, entry.description)
+    return table
+
+
+def sizes(nlp: NLP) -> RenderableType:
+    """The size of the NLP."""
+    jacobian, hessian = nlp.assembly.jacobian.nnz_out(1), nlp.assembly.hessian.nnz_out(0)
+    mesh = f"order {nlp.scheme.order}, {len(nlp.mesh) - 1} steps"
+    counts = f"{nlp.columns.size} unknowns, {nlp.rows.size} rows"
+    entries = f"nonzeros: {jacobian} in the Jacobian, {hessian} in the Hessian's upper triangle"
+    return pairs([("NLP", [f"{counts} ({mesh})", entries])])
+
+
+def ladder(solution: Solution) -> RenderableType:
+    """The meshes on the way, coarse to fine."""
+    objective = f"objective [{solution.provenance.objective_unit}]"
+    table = _table("order", "steps", "iterations", objective, "build [s]", "solve [s]", "status", right=6)
+    estimated = any(level.error is not None for level in solution.ladder)
+    if estimated:
+        table.add_column("error [-]")
+    for level in solution.ladder:
+        row = [str(number) for number in (level.order, level.steps, level.iterations)]
+        row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
+        error = "" if level.error is None else f"{level.error:.1e}"
+        table.add_row(*row, level.status, *([error] if estimated else []))
+    # on a narrow terminal headers break, not numbers
+    for column in table.columns:
+        column.min_width = max((len(str(cell)) for cell in column.cells), default=0)
+    return table
+
+
+def checks(report: Report) -> RenderableType:
+    """The checks, one line each."""
+    table = _table("check", "value", "limit", "unit", "verdict", "note")
+    for check in report.checks:
+        if check.value is None:
+            verdict = Text("does not apply", "dim")
+        else:
+            verdict = Text("holds", "green") if check.ok else Text("FAILS", "bold red")
+        value, limit = ("-" if number is None else f"{number:.4g}" for number in (check.value, check.limit))
+        table.add_row(check.name, value, limit, check.unit, verdict, check.note)
+    return table
+
+
+def answer(
+    solution: Solution, report: Report, quiet: bool = False, written: Sequence[Path] = ()
+) -> RenderableType:
+    """What a solve that succeeded shows: ladder, checks, files, and one line that sums it up."""
+    total = solution.build_s + solution.solve_s + report.seconds
+    found = f"Solved, a local optimum: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
+    broken = ", ".join(check.name for check in report.checks if not check.ok)
+    last = Text(found, "yellow" if broken else "green")
+    last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
+    if quiet:
+        return last
+    verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
+    return Group(*_meshes(solution), *_accuracy(solution), Text(), *verdicts, *_files(written), last)
+
+
+def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
+    """What a solve that failed shows: the worst rows by name, and what to try."""
+    head = Text(f"Not solved: {solution.status} after {solution.iterations} iterations.", "bold red")
+    stopped = solution.status == "stopped"
+    advice = Text("The best iterate is kept." if stopped else f"What to try: {solution.message}.")
+    if quiet:
+        return Group(head, advice)
+    worst = _table("worst rows of the last iterate", "violation")
+    # found by their scaled size, in which different units compare; shown in one's own, largest first
+    units = [unit for _, _, unit in solution.worst]
+    for name, violation, unit in sorted(solution.worst, key=lambda row: (units.index(row[2]), -row[1])):
+        worst.add_row(name, f"{violation:.2e} {unit}")
+    return Group(*_meshes(solution), Text(), worst, Text(), *_files(written), head, advice)
+
+
+def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
+    """The end of a simulation, and how much its energy changed on the way."""
+    from dmoc.effects import Conservative
+
+    energy = trajectory.energy
+    most = float(abs(energy - energy[0]).max())
+    # only where nothing does work is a change of energy the scheme's own
+    kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
+    scale = float(abs(energy).max()) if kept else 0.0
+    share = f", {most / scale:.1e} of it" if scale else ""
+    rows = [
+        ("final time", f"{trajectory.time[-1]:.10g} s"),
+        ("final position", f"{value_words(trajectory.position[-1].tolist())} m"),
+        ("final velocity", f"{value_words(trajectory.velocity[-1].tolist())} m/s"),
+        ("final mass", f"{trajectory.mass[-1]:.10g} kg"),
+        ("energy", f"{energy[0]:.10g} J/kg at the start, {energy[-1]:.10g} J/kg at the end"),
+        ("energy drift" if kept else "energy change", f"{most:.2e} J/kg at most{share}"),
+    ]
+    return pairs(rows)
+
+
+def figures(solution: Solution) -> str:
+    """Such as `effort 0.075 N^2 s, duration 26 s`."""
+    problem = solution.require_problem()
+    name, unit = problem.objective.label, solution.provenance.objective_unit
+    parts = [f"{name} {solution.objective:.8g} {unit}".rstrip()]
+    if name != "time":
+        parts.append(f"duration {solution.duration:.8g} s")
+    if name != "final mass" and solution.final_mass != problem.mass:
+        parts.append(f"final mass {solution.final_mass:.8g} kg")
+    return ", ".join(parts)
+
+
+@contextmanager
+def live_line(unit: str) -> Iterator[Callable | None]:
+    """A `progress` for `solve` that keeps one line of the terminal up to date; None without a terminal."""
+    screen = console(stderr=True)
+    if not screen.is_terminal:
+        yield None
+        return
+    from rich.live import Live
+
+    drawn = -math.inf
+    with Live(Text("building"), console=screen, auto_refresh=False, transient=True) as live:
+
+        def progress(
+            order: int, steps: int, iteration: int, objective: float, row: str, violation: float
+        ) -> bool:
+            nonlocal drawn
+            if time.monotonic() - drawn > REDRAW:
+                drawn = time.monotonic()
+                mesh = f"order {order}, {steps} steps, iteration {iteration}"
+                worst = f", worst {row} {violation:.1e}" if row else ""
+                line = f"{mesh}: objective {objective:.6g} {unit}{worst}"
+                live.update(Text(line, no_wrap=True, overflow="ellipsis"), refresh=True)
+            return False
+
+        yield progress
+
+
+NOT_MET = "The accuracy asked for is not met: this is the best that was found."
+
+
+def _meshes(solution: Solution) -> list[RenderableType]:
+    return [Text("Meshes, coarse to fine", "bold"), ladder(solution)]
+
+
+def _accuracy(solution: Solution) -> list[Text]:
+    """The estimated error and why this mesh, where a tolerance was asked for."""
+    if solution.error is None:
+        return []
+    found, asked = solution.error.largest, solution.tolerance or 0.0
+    words = f"estimated relative error {found:.1e}, asked for {asked:g}"
+    return [Text(f"{solution.reason}; {words}"), *([Text(NOT_MET, "bold yellow")] if found > asked else [])]
+
+
+def _files(written: Sequence[Path]) -> list[Text]:
+    return [Text(f"wrote {path}") for path in written]
+
+
+def pairs(rows: Sequence[tuple[str, Any]]) -> Table:
+    """Names with what belongs to them; a list gives one line an entry."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    for name, words in rows:
+        table.add_row(name, words if isinstance(words, str) else "\n".join(words))
+    return table
+
+
+def _table(*columns: str, right: int = 0) -> Table:
+    """A plain table; the first `right` columns are numbers."""
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i < right else "left", no_wrap=i == 0)
+    return table

@@ -1,0 +1,1 @@
+"""What a solve found, kept."""

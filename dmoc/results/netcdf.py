@@ -1,0 +1,127 @@
+"""Tables in netCDF-4 files: written whole or not at all, sealed by a checksum, refused where damaged.
+
+A checksum after the end of the HDF5 content is verified before anything opens the file: the HDF5 library
+may hang on a damaged one. Files of format 1 have none and are read as they are. Reading takes numbers and
+text from a file and runs nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.files import AGAIN, is_sealed, path_of, sealed, whole_file
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+# (dimensions, values, attributes) of every variable by name
+Table = dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file: its name and version, what to call one, and who writes it."""
+
+    name: str
+    version: int
+    words: str
+    written_by: str
+
+
+def write_table(path: str | os.PathLike, attributes: dict[str, Any], table: Table) -> None:
+    """Write attributes and variables to a netCDF-4 file, whole or not at all."""
+    import h5netcdf
+    import h5py
+
+    # HDF5 may crash where a disk is full, so the content is made in memory.
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        file.attrs.update(attributes)
+        for name, (dimensions, values, about) in table.items():
+            for dimension, size in zip(dimensions, values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = size
+            kind = h5py.string_dtype() if values.dtype == object else values.dtype
+            file.create_variable(name, dimensions, kind, data=values).attrs.update(about)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(sealed(content.getvalue()))
+
+
+def read_table(path: str | os.PathLike, form: Format) -> tuple[dict[str, Any], Table]:
+    """Attributes and variables of a file of one format.
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, or it is damaged, of another kind or from a newer dmoc.
+    """
+    file = path_of(path)
+    _refuse_what_is_no_netcdf(file, form)
+    whole = is_sealed(file)
+    facts, table = _open(file)
+    _refuse_other_formats(file, facts, form)
+    if facts["format_version"] > 1 and not whole:
+        raise ValueError(f"{file} was cut short or changed: it lacks its checksum; {AGAIN}")
+    return facts, table
+
+
+def format_of(path: str | os.PathLike) -> str | None:
+    """The name of the format that a file says it has, or None; ValueError if it is damaged."""
+    import h5py
+
+    try:
+        is_sealed(Path(path))
+        with h5py.File(path, "r") as file:
+            return file.attrs.get("format")
+    except OSError:
+        return None
+
+
+def one_line(error: Exception) -> str:
+    """What an error says, short enough to be read in a terminal."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= 160 else text[:157] + "..."
+
+
+def _refuse_what_is_no_netcdf(file: Path, form: Format) -> None:
+    if not file.is_file():
+        raise ValueError(f"{file} {'is not a file' if file.exists() else 'does not exist'}; {form.written_by}")
+    try:
+        with open(file, "rb") as stream:
+            head = stream.read(len(HDF5_SIGNATURE))
+    except OSError as error:
+        raise ValueError(f"{file} cannot be read: {error.strerror}") from None
+    if len(head) < len(HDF5_SIGNATURE) and HDF5_SIGNATURE.startswith(head):
+        raise ValueError(f"{file} is cut short: it holds {len(head)} bytes; {AGAIN}")
+    if head != HDF5_SIGNATURE:
+        raise ValueError(f"{file} is not {form.words}: it is no netCDF-4 file; {form.written_by}")
+
+
+def _open(file: Path) -> tuple[dict[str, Any], Table]:
+    """Attributes and variables of a netCDF file, as they were written."""
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(file, "r", phony_dims="access", decode_vlen_strings=True) as data:
+            table = {name: (one.dimensions, one[...], dict(one.attrs)) for name, one in data.variables.items()}
+            return dict(data.attrs), table
+    except Exception as error:  # the layers below raise whatever they trip over
+        raise ValueError(f"{file} is damaged or cut short ({one_line(error)}); {AGAIN}") from None
+
+
+def _refuse_other_formats(file: Path, facts: dict[str, Any], form: Format) -> None:
+    version = facts.get("format_version")
+    if (facts.get("format"), form.name) == ("dmoc sweep", "dmoc solution"):
+        raise ValueError(f"{file} is the result of a sweep; draw it with: dmoc plot {file}")
+    if facts.get("format") != form.name or not isinstance(version, (int, np.integer)):
+        raise ValueError(f"{file} is netCDF but not {form.words}; {form.written_by}")
+    if version > form.version:
+        raise ValueError(
+            f"{file} comes from a newer dmoc (format {version}, this one reads up to {form.version}); "
+            "update dmoc"
+        )

@@ -1,0 +1,213 @@
+"""Solution: what a solve found, in SI units, with what it took; saved to and loaded from netCDF."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import of_kind
+from dmoc.motion.mesh import Guess
+from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.table import read, write
+from dmoc.scene.problem import TransferProblem
+
+
+class SolveError(RuntimeError):
+    """Raised by `Solution.raise_for_status` when the optimisation failed."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The answer to a transfer problem on the last mesh, whether it succeeded or not.
+
+    Attributes
+    ----------
+    problem : TransferProblem or None
+        None after `load`: a file holds numbers, not the problem; see `attach`.
+    path : Guess
+        Positions [m], controls, masses [kg], boundary velocities [m/s] and multipliers on the mesh.
+    time : array, shape (nodes,)
+        Times of the nodes [s].
+    force : array, shape (nodes, axes), or (steps, axes) with hold
+        Force of the actuator [N].
+    velocity, momentum : arrays, shape (steps+1, axes)
+        At the step ends, from the discrete Legendre transforms [m/s]; momentum is per unit mass.
+    costate : array, shape (nodes, axes)
+        Multipliers of the discrete Euler-Lagrange equations [unit of the objective per m/s].
+    status, message : str
+        What the solver said, and what to try if it failed.
+    ladder : tuple of Level
+        The meshes on the way, coarse to fine.
+    worst : tuple of (str, float, str)
+        The worst violated rows and bounds of a failed solve, worst first: name, size and unit.
+    tolerance, error, reason
+        What accuracy was asked for, the estimated errors, and why this mesh; empty without a tolerance.
+    provenance : Provenance
+    """
+
+    problem: TransferProblem | None
+    path: Guess
+    velocity: np.ndarray
+    momentum: np.ndarray
+    force: np.ndarray
+    objective: float
+    success: bool
+    status: str
+    message: str
+    ladder: tuple[Level, ...]
+    worst: tuple[tuple[str, float, str], ...] = ()
+    tolerance: float | None = None
+    error: Error | None = None
+    reason: str = ""
+    provenance: Provenance = field(kw_only=True)
+
+    @property
+    def order(self) -> int:
+        return self.path.order
+
+    @property
+    def hold(self) -> bool:
+        return self.path.hold
+
+    @property
+    def steps(self) -> int:
+        return len(self.path.mesh) - 1
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes, 1 to 3."""
+        return self.path.position.shape[1]
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.path.duration
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.provenance.start_time + self.duration * self.path.fractions
+
+    @property
+    def end_times(self) -> np.ndarray:
+        """Times of the step ends [s], shape (steps+1,)."""
+        return self.provenance.start_time + self.duration * self.path.mesh
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions of the nodes [m], shape (nodes, axes)."""
+        return self.path.position
+
+    @property
+    def final_mass(self) -> float:
+        """Mass at the goal [kg]."""
+        return float(self.path.mass[-1])
+
+    @property
+    def costate(self) -> np.ndarray:
+        return self.path.multipliers["smooth:row:dynamics"]
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of Ipopt on all meshes."""
+        return sum(level.iterations for level in self.ladder)
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of functions and derivatives on all meshes."""
+        return sum(level.evaluations for level in self.ladder)
+
+    @property
+    def build_s(self) -> float:
+        """Seconds spent on building NLPs."""
+        return sum(level.build_s for level in self.ladder)
+
+    @property
+    def solve_s(self) -> float:
+        """Seconds spent in Ipopt."""
+        return sum(level.solve_s for level in self.ladder)
+
+    def raise_for_status(self) -> Solution:
+        """Itself if the solve succeeded.
+
+        Raises
+        ------
+        SolveError
+            With what failed and what to try.
+        """
+        if not self.success:
+            raise SolveError(f"{self.status}: {self.message}")
+        return self
+
+    def require_problem(self) -> TransferProblem:
+        """The problem.
+
+        Raises
+        ------
+        ValueError
+            If the solution was loaded from a file and no problem has been attached since.
+        """
+        if self.problem is None:
+            name = self.provenance.problem_name
+            raise ValueError(
+                f"this solution was loaded from a file and does not hold its problem {name!r}; "
+                "use solution.attach(problem) first"
+            )
+        return self.problem
+
+    def attach(self, problem: TransferProblem) -> Solution:
+        """A copy that holds its problem again, after `load`.
+
+        Raises
+        ------
+        ValueError
+            If the problem has another dimension, number of controls or start time than the solution.
+        """
+        of_kind("problem", problem, TransferProblem)
+        facts = (
+            ("dimension", self.dimension, problem.dimension, ""),
+            ("number of controls", self.path.control.shape[1], problem.actuator.size(problem.dimension), ""),
+            ("start time", self.provenance.start_time, problem.start_time, " s"),
+        )
+        for name, here, there, unit in facts:
+            if here != there:
+                raise ValueError(
+                    f"problem {problem.name!r} does not fit this solution of {self.provenance.problem_name!r}: "
+                    f"its {name} is {there:g}{unit}, the solution's {here:g}{unit}; "
+                    "attach the problem that was solved"
+                )
+        return replace(self, problem=problem)
+
+    def save(self, path: str | os.PathLike, **provenance: Any) -> None:
+        """Write the solution to a netCDF-4 file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            Where to; an existing file is replaced.
+        provenance
+            What only the caller knows, by the names of `Provenance` (`source_hash`, `parameters`,
+            `problem_name`, ...).
+
+        Raises
+        ------
+        ValueError
+            If the folder does not exist.
+        """
+        write(replace(self, provenance=replace(self.provenance, **provenance)), path)
+
+
+def load(path: str | os.PathLike) -> Solution:
+    """The solution in a file that `Solution.save` wrote. Nothing in the file is ever run.
+
+    The problem is not in the file: `load(path).attach(problem)` gives it back. A loaded solution is
+    as good a guess as the original: `solve(problem, guess=load(path))`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such file, or it is damaged, foreign or from a newer dmoc.
+    """
+    return read(path, Solution)

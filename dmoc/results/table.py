@@ -1,0 +1,251 @@
+"""Result files: a Solution as netCDF-4, with units, and back again to the last bit.
+
+xarray opens them and has a view of a Solution, but is not needed to write or read one: with pandas,
+which it brings along, it takes longer to load than a solution to be checked.
+
+Dimensions: node, end (of a step), step, axis, channel (one a control). Every multiplier group is a
+variable of its own, `multiplier_<side>_<name>`, whose attribute `key` is its name in
+`Guess.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.files import AGAIN
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess
+from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.netcdf import Format, Table, one_line, read_table, write_table
+
+SOLUTION_FILE = Format(
+    "dmoc solution", 2, "a result of dmoc", "results are written by Solution.save and by dmoc solve"
+)
+
+# SI unit of the unknown or row behind each multiplier, by the last part of its name; other rows have none.
+DUAL_UNITS = {
+    "dynamics": "m/s",
+    "position": "m",
+    "velocity": "m/s",
+    "force": "N",
+    "mass": "kg",
+    "duration": "s",
+}
+
+
+def write(solution: Any, path: str | os.PathLike) -> None:
+    """Write a Solution to a netCDF-4 file, whole or not at all."""
+    write_table(path, _attributes(solution), _variables(solution))
+
+
+def read(path: str | os.PathLike, make: Callable) -> Any:
+    """The solution in a file, without its problem; `make` takes the arguments of Solution."""
+    facts, table = read_table(path, SOLUTION_FILE)
+    try:
+        return _check_shapes(_solution(facts, table, make))
+    except KeyError as error:
+        raise ValueError(f"{path} is damaged: it lacks the attribute {error}; {AGAIN}") from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ValueError(f"{path} is damaged: {one_line(error)}; {AGAIN}") from None
+
+
+def to_dataset(solution: Any) -> Any:
+    """An `xarray.Dataset` of everything a solution holds except its problem."""
+    import xarray
+
+    return xarray.Dataset(_variables(solution), attrs=_attributes(solution))
+
+
+def _variables(solution: Any) -> Table:
+    path, about = solution.path, solution.provenance
+    at = "step" if path.hold else "node"
+    control_unit = ", ".join(dict.fromkeys(about.control_units))
+    table = {
+        "time": (("node",), solution.time, "s", "time"),
+        "end_time": (("end",), solution.end_times, "s", "time of the step ends"),
+        "mesh": (("end",), path.mesh, "1", "step ends as fractions of the duration"),
+        "position": (("node", "axis"), path.position, "m", "position"),
+        "velocity": (("end", "axis"), solution.velocity, "m/s", "velocity from the discrete momenta"),
+        "momentum": (("end", "axis"), solution.momentum, "m/s", "discrete momentum per unit mass"),
+        "force": ((at, "axis"), solution.force, "N", "force of the actuator"),
+        "control": ((at, "channel"), path.control, control_unit, "control"),
+        "mass": (("node",), path.mass, "kg", "mass"),
+        "start_velocity": (("axis",), path.start_velocity, "m/s", "velocity at the start"),
+        "goal_velocity": (("axis",), path.goal_velocity, "m/s", "velocity at the goal"),
+    }
+    variables: Table = {
+        name: (dims, values, {"units": unit, "long_name": words})
+        for name, (dims, values, unit, words) in table.items()
+    }
+    labels = {"axis": list("xyz"[: solution.dimension]), "channel": list(about.control_labels)}
+    coordinates = {name: ((name,), np.array(values, object), {"units": "1"}) for name, values in labels.items()}
+    return variables | _multipliers(solution) | coordinates
+
+
+def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
+    """The solution in a file's attributes and variables."""
+    return make(
+        None,
+        _path(facts, table),
+        _array(table, "velocity"),
+        _array(table, "momentum"),
+        _array(table, "force"),
+        float(facts["objective"]),
+        bool(facts["success"]),
+        str(facts["status"]),
+        str(facts["message"]),
+        tuple(Level(**level) for level in json.loads(facts["ladder"])),
+        tuple((str(name), float(size), str(unit)) for name, size, unit in json.loads(facts["worst"])),
+        tolerance=json.loads(facts["tolerance"]),
+        error=Error(**error) if (error := json.loads(facts["error"])) else None,
+        reason=str(facts["reason"]),
+        provenance=_provenance(facts, table),
+    )
+
+
+def _path(facts: dict[str, Any], table: Table) -> Guess:
+    groups = [name for name in table if name.startswith("multiplier_")]
+    return Guess(
+        _array(table, "mesh"),
+        int(facts["order"]),
+        bool(facts["hold"]),
+        float(facts["duration"]),
+        _array(table, "position"),
+        _array(table, "control"),
+        _array(table, "mass"),
+        _array(table, "start_velocity"),
+        _array(table, "goal_velocity"),
+        {str(table[name][2]["key"]): _array(table, name) for name in groups},
+    )
+
+
+def _provenance(facts: dict[str, Any], table: Table) -> Provenance:
+    return Provenance(
+        str(facts["problem"]),
+        json.loads(facts["parameters"]),
+        float(facts["start_time"]),
+        str(facts["objective_unit"]),
+        tuple(str(label) for label in table["channel"][1]),
+        tuple(json.loads(facts["control_units"])),
+        json.loads(facts["options"]),
+        str(facts["source_hash"]),
+        json.loads(facts["versions"]),
+        str(facts["created"]),
+    )
+
+
+def _array(table: Table, name: str) -> np.ndarray:
+    if name not in table:
+        raise ValueError(f"it lacks the variable {name!r}")
+    return np.array(table[name][1], float)
+
+
+def _attributes(solution: Any) -> dict[str, Any]:
+    """What a reader of the file looks for first as attributes of their own, the rest as JSON."""
+    about = solution.provenance
+    if not about.created:
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        about = replace(about, created=now, versions=_versions() | about.versions)
+    plain = "order steps duration status message objective reason iterations build_s solve_s"
+    texts = {
+        "parameters": about.parameters,
+        "options": about.options,
+        "versions": about.versions,
+        "control_units": about.control_units,
+        "ladder": [asdict(level) for level in solution.ladder],
+        "worst": solution.worst,
+        "tolerance": solution.tolerance,
+        "error": asdict(solution.error) if solution.error else None,
+    }
+    return {
+        "format": SOLUTION_FILE.name,
+        "format_version": SOLUTION_FILE.version,
+        "problem": about.problem_name,
+        "source_hash": about.source_hash,
+        "created": about.created,
+        "start_time": about.start_time,
+        "time_unit": "s",
+        "objective_unit": about.objective_unit,
+        "hold": int(solution.hold),
+        "success": int(solution.success),
+        **{name: getattr(solution, name) for name in plain.split()},
+        **{name: _text(value) for name, value in texts.items()},
+    }
+
+
+def _versions() -> dict[str, str]:
+    import casadi
+
+    from dmoc import __version__
+
+    return {
+        "dmoc": __version__,
+        "casadi": casadi.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def _text(value: Any) -> str:
+    """JSON; arrays become lists and what JSON has no word for its Python text."""
+
+    def plain(other: Any) -> Any:
+        return other.tolist() if isinstance(other, (np.ndarray, np.generic)) else repr(other)
+
+    return json.dumps(value, default=plain)
+
+
+def _multipliers(solution: Any) -> Table:
+    variables: Table = {}
+    for key, values in solution.path.multipliers.items():
+        _, side, group = key.split(":", 2)
+        name = re.sub(r"\W+", "_", f"multiplier_{side}_{group}")
+        while name in variables:
+            name += "_"
+        unit = DUAL_UNITS.get(group.split(".")[-1] if side == "column" or group == "dynamics" else "")
+        cost = solution.provenance.objective_unit or "1"
+        attributes = {"units": f"{cost}/({unit})" if unit else cost, "key": key}
+        attributes["long_name"] = f"multiplier of {group}; of nodes and steps per fraction of the duration"
+        variables[name] = (_dimensions(solution, key.split(":")[0], values.shape), values, attributes)
+    return variables
+
+
+def _dimensions(solution: Any, kind: str, shape: tuple[int, int]) -> tuple[str, str]:
+    """Names of a multiplier group's two dimensions: those of the path where they are the same thing."""
+    kind = {"smooth": "node", "control": "step" if solution.hold else "node"}.get(kind, kind)
+    sizes = {"node": len(solution.path.position), "step": solution.steps}
+    first = kind if sizes.get(kind) == shape[0] else f"count_{shape[0]}"
+    return first, "axis" if shape[1] == solution.dimension else f"component_{shape[1]}"
+
+
+def _check_shapes(solution: Any) -> Any:
+    """Raise ValueError unless the arrays belong together: what was cut or edited must not get further."""
+    path, axes = solution.path, solution.dimension
+    degree = scheme(path.order).degree
+    nodes = solution.steps * degree + 1
+    controls = solution.steps if path.hold else nodes
+    shapes = {
+        "position": (path.position, (nodes, axes)),
+        "mass": (path.mass, (nodes,)),
+        "control": (path.control, (controls, len(solution.provenance.control_labels))),
+        "force": (solution.force, (controls, axes)),
+        "velocity": (solution.velocity, (solution.steps + 1, axes)),
+        "momentum": (solution.momentum, (solution.steps + 1, axes)),
+        "start_velocity": (path.start_velocity, (axes,)),
+        "goal_velocity": (path.goal_velocity, (axes,)),
+    }
+    for name, (values, wanted) in shapes.items():
+        if values.shape != wanted:
+            raise ValueError(f"{name} has shape {values.shape} where {wanted} belongs")
+    if not (np.diff(path.mesh) > 0).all() or path.mesh[0] != 0 or path.mesh[-1] != 1:
+        raise ValueError("its mesh does not increase from 0 to 1")
+    return solution

@@ -1,0 +1,1 @@
+"""What is asked: what pushes, what is minimised, what is forbidden, where it starts and ends."""

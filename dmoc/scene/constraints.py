@@ -1,0 +1,232 @@
+"""What is forbidden on the way."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import entries, number, same_length, short, vector
+from dmoc.scene.rows import Row
+
+
+class Constraint(ABC):
+    """A limit on positions (`rows`, `bounds`) or on the speed (`speed_rows`) all along the path."""
+
+    unit: ClassVar[str] = "m"
+    adjustable: ClassVar[tuple[str, ...]] = ()
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the constraint has no meaning in this many dimensions."""
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        """Rows that hold at every node."""
+        return []
+
+    def speed_rows(self, v: Any) -> list[Row]:
+        """Rows that hold at the Gauss points of every step and at both ends."""
+        return []
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        """Plain bounds of the position [m]."""
+        limit = np.full(dimension, np.inf)
+        return -limit, limit
+
+    @abstractmethod
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """By how much states of shape (count, dimension) break the limit, in `unit`; 0 where it holds."""
+
+    @abstractmethod
+    def words(self) -> str:
+        """One line for a person."""
+
+
+@dataclass(frozen=True)
+class KeepOut(Constraint):
+    """Stay outside a sphere (a disc in the plane).
+
+    Parameters
+    ----------
+    center : sequence of float
+        Centre [m].
+    radius : float
+        Radius [m].
+    """
+
+    center: tuple
+    radius: float
+    adjustable: ClassVar[tuple[str, ...]] = ("center", "radius")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", vector("center", self.center, "m"))
+        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
+
+    def check_dimension(self, dimension: int) -> None:
+        _need(self, "center", len(self.center), dimension)
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        offset = (q - self.center) / self.radius
+        return [Row("clearance", ca.dot(offset, offset), 1.0, np.inf)]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
+
+    def words(self) -> str:
+        return f"stays {self.radius:g} m away from {_point(self.center)}"
+
+
+@dataclass(frozen=True)
+class KeepIn(Constraint):
+    """Stay inside a box.
+
+    Parameters
+    ----------
+    lower, upper : sequence of float
+        Opposite corners [m]; entries may be -inf and inf.
+    """
+
+    lower: tuple
+    upper: tuple
+
+    def __post_init__(self) -> None:
+        for name in ("lower", "upper"):
+            value = getattr(self, name)
+            given = entries(value)
+            given = (value,) if given is None else given
+            endless = {
+                i for i, x in enumerate(given) if isinstance(x, (float, np.floating)) and abs(x) == np.inf
+            }
+            finite = vector(name, [0.0 if i in endless else x for i, x in enumerate(given)], "m")
+            corner = (float(given[i] if i in endless else x) for i, x in enumerate(finite))
+            object.__setattr__(self, name, tuple(corner))
+        same_length("KeepIn", lower=self.lower, upper=self.upper)
+        for low, high in zip(self.lower, self.upper, strict=True):
+            if low >= high:
+                raise ValueError(
+                    f"KeepIn: lower must be less than upper on every axis; got {low:g} and {high:g} m"
+                )
+
+    def check_dimension(self, dimension: int) -> None:
+        _need(self, "lower", len(self.lower), dimension)
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.lower), np.array(self.upper)
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, np.maximum(self.lower - q, q - self.upper)).max(axis=1)
+
+    def words(self) -> str:
+        return f"stays between {_point(self.lower)} and {_point(self.upper)}"
+
+
+@dataclass(frozen=True)
+class SpeedLimit(Constraint):
+    """Stay below a speed.
+
+    Parameters
+    ----------
+    limit : float
+        Largest speed [m/s].
+    """
+
+    limit: float
+    unit: ClassVar[str] = "m/s"
+    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", number("limit", self.limit, "m/s", positive=True))
+
+    def speed_rows(self, v: Any) -> list[Row]:
+        return [Row("speed", ca.dot(v, v) / self.limit**2, -np.inf, 1.0)]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, np.linalg.norm(v, axis=1) - self.limit)
+
+    def words(self) -> str:
+        return f"is never faster than {self.limit:g} m/s"
+
+
+@dataclass(frozen=True)
+class ApproachCone(Constraint):
+    """Stay inside a cone: axis . d >= cos(half_angle) |d| with d the position from the apex.
+
+    In the plane these are two straight lines. In space |d| is rounded over `rounding` at the apex,
+    where it has no derivative; the apex itself is allowed.
+
+    Parameters
+    ----------
+    apex : sequence of float
+        Tip of the cone [m].
+    axis : sequence of float
+        Direction from the tip into the cone [-]; made a unit vector.
+    half_angle : float
+        Between the axis and the surface [rad], less than pi/2.
+    rounding : float
+        [m].
+    """
+
+    apex: tuple
+    axis: tuple
+    half_angle: float
+    rounding: float = 1e-6
+    adjustable: ClassVar[tuple[str, ...]] = ("apex", "axis", "half_angle", "rounding")
+
+    def __post_init__(self) -> None:
+        apex, axis = vector("apex", self.apex, "m"), vector("axis", self.axis, "-")
+        same_length("ApproachCone", apex=apex, axis=axis)
+        length = float(np.linalg.norm(axis))
+        if len(axis) == 1 or length == 0:
+            raise ValueError(
+                f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {short(self.axis)}"
+            )
+        half_angle = number("half_angle", self.half_angle, "rad", positive=True)
+        if half_angle >= np.pi / 2:
+            raise ValueError(f"ApproachCone: half_angle must be less than pi/2 rad; got {half_angle:g}")
+        object.__setattr__(self, "apex", apex)
+        object.__setattr__(self, "axis", tuple(x / length for x in axis))
+        object.__setattr__(self, "half_angle", half_angle)
+        object.__setattr__(self, "rounding", number("rounding", self.rounding, "m", positive=True))
+
+    def check_dimension(self, dimension: int) -> None:
+        _need(self, "apex", len(self.apex), dimension)
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        offset = q - self.apex
+        depth = ca.dot(offset, self.axis)
+        cos, sin = ca.cos(self.half_angle), ca.sin(self.half_angle)
+        if q.shape[0] == 2:
+            side = cos * ca.det(ca.horzcat(ca.vertcat(self.axis[0], self.axis[1]), offset))
+            lines = {"left": sin * depth - side, "right": sin * depth + side}
+            return [Row(name, inward, 0.0, np.inf, "m") for name, inward in lines.items()]
+        distance = ca.sqrt(ca.dot(offset, offset) + self.rounding**2) - self.rounding
+        return [Row("cone", depth - cos * distance, 0.0, np.inf, "m")]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        offset = q - np.asarray(self.apex)
+        depth = offset @ np.asarray(self.axis)
+        aside = np.linalg.norm(offset - depth[:, None] * np.asarray(self.axis), axis=1)
+        beyond = np.arctan2(aside, depth) - self.half_angle
+        return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
+
+    def words(self) -> str:
+        angle, axis = np.degrees(self.half_angle), _numbers(self.axis)
+        return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {axis}"
+
+
+def _need(part: Any, argument: str, given: int, dimension: int) -> None:
+    if given != dimension:
+        raise ValueError(
+            f"{type(part).__name__}: {argument} has {given} entries but the problem has {dimension} "
+            f"dimensions; give {dimension}"
+        )
+
+
+def _point(values: tuple) -> str:
+    return f"{_numbers(values)} m"
+
+
+def _numbers(values: tuple) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

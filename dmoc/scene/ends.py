@@ -1,0 +1,261 @@
+"""Where a transfer starts and ends."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import entries, number, same_length, short, vector
+from dmoc.effects.motion import as_column, tried
+from dmoc.scene.rows import Row
+
+OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"
+
+
+class Boundary(ABC):
+    """A condition on time, position, velocity and mass at one end of the transfer."""
+
+    adjustable: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    @abstractmethod
+    def dimension(self) -> int:
+        """Number of axes; 0 where the other end decides."""
+
+    @property
+    def structure(self) -> tuple:
+        """What cannot change in a re-solve: two boundaries with the same structure have the same rows."""
+        return (type(self),)
+
+    def with_dimension(self, dimension: int) -> Boundary:
+        """The same boundary, with the number of axes filled in where it was left open."""
+        return self
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and velocity [m/s] entries that are fixed numbers; NaN where they are not."""
+        free = np.full(self.dimension, np.nan)
+        return free, free.copy()
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        """Further conditions, each independent of the others and of what is fixed."""
+        return []
+
+    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """A position and velocity for the starting guess; NaN where nothing is known.
+
+        `near` is a position and velocity to be close to: what the other end coasts to.
+        """
+        return self.fixed()
+
+    @property
+    def anchored(self) -> bool:
+        """Whether the estimate of the position stands by itself, without the other end."""
+        return not np.isnan(self.fixed()[0]).any()
+
+    @abstractmethod
+    def words(self) -> str:
+        """One line for a person."""
+
+
+@dataclass(frozen=True)
+class State(Boundary):
+    """A position and a velocity; what is None is free.
+
+    Parameters
+    ----------
+    position : sequence of float or None
+        [m], one entry an axis. An entry that is None is free; None alone frees all of them.
+    velocity : sequence of float or None
+        [m/s], the same.
+    """
+
+    position: tuple
+    velocity: tuple
+
+    def __post_init__(self) -> None:
+        position, velocity = self.position, self.velocity
+        if position is None and velocity is None:
+            raise ValueError("State: position and velocity are both None; fix at least one of them [m], [m/s]")
+        if position is None:
+            position = (None,) * len(entries(velocity) or (velocity,))
+        if velocity is None:
+            velocity = (None,) * len(entries(position) or (position,))
+        object.__setattr__(self, "position", vector("position", position, "m", free=True))
+        object.__setattr__(self, "velocity", vector("velocity", velocity, "m/s", free=True))
+        same_length("State", position=self.position, velocity=self.velocity)
+
+    @property
+    def dimension(self) -> int:
+        return len(self.position)
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.position, float), np.array(self.velocity, float)
+
+    def words(self) -> str:
+        return f"position {_entries(self.position)} m, velocity {_entries(self.velocity)} m/s"
+
+
+@dataclass(frozen=True)
+class Moving(Boundary):
+    """A state that moves: the body meets it at whatever time the transfer starts or ends.
+
+    Parameters
+    ----------
+    position : callable
+        Function of the time [s], a CasADi symbol, that gives the position [m], one entry an axis.
+    velocity : callable, "matched" or None
+        Function of the time that gives the velocity [m/s]; "matched" is the derivative of the
+        position, None leaves the velocity free (an interception).
+    """
+
+    position: Callable
+    velocity: Callable | str | None = "matched"
+
+    def __post_init__(self) -> None:
+        if not callable(self.position):
+            raise ValueError(
+                f"Moving: position must be a function of the time [s]; got {short(self.position)}; "
+                "use State(position, velocity) for what does not move"
+            )
+        word = self.velocity is None or (isinstance(self.velocity, str) and self.velocity == "matched")
+        if not (callable(self.velocity) or word):
+            raise ValueError(
+                f"Moving: velocity must be a function of the time [s], 'matched' or None; "
+                f"got {short(self.velocity)}"
+            )
+        for name in ("position",) if word else ("position", "velocity"):
+            tried(f"Moving: {name}", getattr(self, name), [ca.SX.sym("t")], OF_TIME)
+        sizes = [self._motion.numel_out(i) for i in range(self._motion.n_out())]
+        if not 1 <= sizes[0] <= 3 or len(set(sizes)) > 1:
+            raise ValueError(
+                "Moving: position and velocity must have the same 1 to 3 entries; "
+                f"got {sizes[0]} and {sizes[-1]}"
+            )
+
+    @cached_property
+    def _motion(self) -> ca.Function:
+        """t -> position [m] and, unless it is free, velocity [m/s]."""
+        t = ca.SX.sym("t")
+        position = ca.SX(as_column(self.position(t)))
+        if self.velocity is None:
+            return ca.Function("motion", [t], [position])
+        moving = as_column(self.velocity(t)) if callable(self.velocity) else ca.jacobian(position, t)
+        return ca.Function("motion", [t], [position, ca.densify(moving)])
+
+    @property
+    def dimension(self) -> int:
+        return self._motion.numel_out(0)
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.position, self.velocity
+
+    @property
+    def anchored(self) -> bool:
+        return True
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        rows = []
+        for have, want, name, unit in zip(
+            (q, v), self._motion.call([t]), ("position", "velocity"), ("m", "m/s"), strict=False
+        ):
+            for i, axis in enumerate("xyz"[: self.dimension]):
+                rows.append(Row(f"{name}.{axis}", have[i] - want[i], 0.0, 0.0, unit))
+        return rows
+
+    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+        position, *velocity = (np.array(ca.DM(value)).ravel() for value in self._motion.call([t]))
+        return position, velocity[0] if velocity else np.full(self.dimension, np.nan)
+
+    def words(self) -> str:
+        where = ", ".join(f"{value:.4g}" for value in self.estimate(0.0)[0])
+        velocity = "any velocity" if self.velocity is None else "its velocity"
+        return f"a point that moves, at ({where}) m at 0 s, with {velocity}"
+
+
+@dataclass(frozen=True)
+class Condition(Boundary):
+    """Any condition: function(t, q, v, m) = 0, beside what a State fixes.
+
+    Parameters
+    ----------
+    function : callable
+        (t [s], q [m], v [m/s], m [kg]) -> a CasADi expression or a list of them, each zero where the
+        condition holds. They must be independent of each other and of what `state` fixes.
+    name : str
+        What the rows are called, such as "circular".
+    scale : float or sequence of float
+        Typical size of each value, in its own unit.
+    state : State, optional
+        Entries of position and velocity that are fixed; none if not given.
+    """
+
+    function: Callable
+    name: str = "condition"
+    scale: float | tuple = 1.0
+    state: State | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise ValueError(f"Condition: function must be a function (t, q, v, m); got {short(self.function)}")
+        if not isinstance(self.name, str) or not self.name:
+            raise ValueError(f"Condition: name must be a word; got {short(self.name)}")
+        scales = entries(self.scale)
+        if scales is None:
+            checked: Any = number("scale", self.scale, "unit of the condition", positive=True)
+        else:
+            checked = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scales))
+        object.__setattr__(self, "scale", checked)
+        if self.state is not None:
+            if not isinstance(self.state, State):
+                raise ValueError(f"Condition: state must be a dmoc.State; got {short(self.state)}")
+            self._check_values()
+
+    @property
+    def dimension(self) -> int:
+        return 0 if self.state is None else self.state.dimension
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.function, self.name, self.scale
+
+    def with_dimension(self, dimension: int) -> Condition:
+        free = (None,) * dimension
+        return replace(self, state=State(free, free)) if self.state is None else self
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        return super().fixed() if self.state is None else self.state.fixed()
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        values = as_column(self.function(t, q, v, m))
+        count = values.numel()
+        names = [self.name] if count == 1 else [f"{self.name}_{i + 1}" for i in range(count)]
+        scales = np.broadcast_to(self.scale, (count,))
+        return [Row(names[i], values[i] / float(scales[i]), 0.0, 0.0) for i in range(count)]
+
+    def _check_values(self) -> None:
+        n = self.dimension
+        given = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
+        remedy = "it must take (t, q, v, m) as CasADi expressions and give one or a list of them"
+        count = tried(f"Condition {self.name!r}: function", self.function, list(given), remedy)
+        if isinstance(self.scale, tuple) and len(self.scale) != count:
+            raise ValueError(
+                f"Condition {self.name!r}: scale has {len(self.scale)} entries but the function gives {count} "
+                f"values; give one number or {count}"
+            )
+
+    def words(self) -> str:
+        condition = f"the condition {self.name!r}"
+        if self.state is None or np.isnan(self.state.fixed()).all():
+            return condition
+        return f"{self.state.words()}, {condition}"
+
+
+def _entries(values: Any) -> str:
+    return "(" + ", ".join("free" if value is None else f"{value:g}" for value in values) + ")"

@@ -1,0 +1,221 @@
+"""What pushes and burns: thrust with a magnitude of its own, and a mass that shrinks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import entries, limits, number, short, vector
+from dmoc.scene.actuator import Actuator
+from dmoc.scene.rows import Row
+
+STANDARD_GRAVITY = 9.80665
+
+
+class _Burner(Actuator):
+    """Shared by engines and nozzles: exhaust velocity, dry mass, mass flow."""
+
+    exhaust_velocity: float | None
+    dry_mass: float
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.burns
+
+    @property
+    def burns(self) -> bool:
+        return self.exhaust_velocity is not None
+
+    def flow(self, u: Any) -> Any:
+        return self.throttle(u) / self.exhaust_velocity if self.burns else None
+
+    def metered(self, dimension: int) -> Actuator:
+        return self
+
+    def _check_exhaust(self, specific_impulse: Any) -> None:
+        name = type(self).__name__
+        if specific_impulse is not None and self.exhaust_velocity is not None:
+            raise ValueError(f"{name}: give specific_impulse [s] or exhaust_velocity [m/s], not both")
+        if specific_impulse is not None:
+            seconds = number("specific_impulse", specific_impulse, "s", positive=True)
+            object.__setattr__(self, "exhaust_velocity", seconds * STANDARD_GRAVITY)
+            object.__setattr__(self, "specific_impulse", None)
+        elif self.exhaust_velocity is not None:
+            speed = number("exhaust_velocity", self.exhaust_velocity, "m/s", positive=True)
+            object.__setattr__(self, "exhaust_velocity", speed)
+        object.__setattr__(self, "dry_mass", number("dry_mass", self.dry_mass, "kg", nonnegative=True))
+
+    def _burning_words(self) -> str:
+        if not self.burns:
+            return ", without burning mass"
+        return f", exhaust velocity {self.exhaust_velocity:g} m/s, dry mass {self.dry_mass:g} kg"
+
+
+@dataclass(frozen=True)
+class Engine(_Burner):
+    """A thrust vector of limited magnitude, |F| <= max_thrust, that burns |F| / exhaust_velocity [kg/s].
+
+    The controls of a node are the force and its magnitude, the throttle, tied together by
+    sqrt(|F|^2 + eps^2) = throttle with eps = smoothing * max_thrust: at zero thrust |F| alone has no
+    derivative. A coasting engine so burns eps / exhaust_velocity, which the default keeps at 1e-5 of
+    full flow. The set of forces is a ball, convex, as long as min_thrust is 0; with a throttle floor
+    it is a shell, not convex, and solutions are local optima in a stronger sense.
+
+    Parameters
+    ----------
+    max_thrust : float
+        Largest thrust [N].
+    specific_impulse : float, optional
+        [s], with standard gravity 9.80665 m/s^2; or give exhaust_velocity. With neither, mass is constant.
+    exhaust_velocity : float, optional
+        [m/s].
+    dry_mass : float
+        Mass below which it cannot burn [kg].
+    min_thrust : float
+        Throttle floor [N].
+    box : float or sequence of float, optional
+        Further limit on each component of the thrust [N].
+    smoothing : float
+        Width of the rounding of |F| at zero, relative to max_thrust [-].
+    """
+
+    max_thrust: float
+    specific_impulse: float | None = None
+    exhaust_velocity: float | None = None
+    dry_mass: float = 0.0
+    min_thrust: float = 0.0
+    box: float | tuple | None = None
+    smoothing: float = 1e-5
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "max_thrust", number("max_thrust", self.max_thrust, "N", positive=True))
+        object.__setattr__(self, "min_thrust", number("min_thrust", self.min_thrust, "N", nonnegative=True))
+        if self.min_thrust >= self.max_thrust:
+            raise ValueError(
+                "Engine: min_thrust must be less than max_thrust; "
+                f"got {self.min_thrust:g} and {self.max_thrust:g} N"
+            )
+        object.__setattr__(self, "smoothing", number("smoothing", self.smoothing, "-", positive=True))
+        if self.box is not None:
+            object.__setattr__(self, "box", limits("box", self.box, "N"))
+        self._check_exhaust(self.specific_impulse)
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("max_thrust", "smoothing", *(["exhaust_velocity"] if self.burns else []))
+
+    def size(self, dimension: int) -> int:
+        return dimension + 1
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return (*"xyz"[:dimension], "throttle")
+
+    def force(self, u: Any) -> Any:
+        return u[:-1]
+
+    def throttle(self, u: Any) -> Any:
+        return u[-1]
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        side = np.broadcast_to(np.inf if self.box is None else np.asarray(self.box, float), (dimension,))
+        return np.append(-side, self.min_thrust), np.append(side, self.max_thrust)
+
+    def rows(self, u: Any) -> list[Row]:
+        force = self.force(u) / self.max_thrust
+        norm = ca.sqrt(ca.dot(force, force) + self.smoothing**2)
+        return [Row("norm", norm - self.throttle(u) / self.max_thrust, 0.0, 0.0)]
+
+    def force_limit(self) -> float:
+        return self.max_thrust
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        thrust = np.linalg.norm(u[:, :-1], axis=1)
+        over = np.maximum(thrust - self.max_thrust, self.min_thrust - u[:, -1])
+        # what the throttle does not pay for, beyond what the rounding of |F| makes
+        unpaid = np.abs(np.hypot(thrust, self.smoothing * self.max_thrust) - u[:, -1])
+        return np.maximum(0.0, np.maximum(over, unpaid))
+
+    def words(self) -> str:
+        floor = f" and at least {self.min_thrust:g} N" if self.min_thrust else ""
+        return f"an engine of at most {self.max_thrust:g} N{floor}{self._burning_words()}"
+
+
+@dataclass(frozen=True)
+class Nozzles(_Burner):
+    """Fixed nozzles, each with a thrust between 0 and its largest: F = sum_i u_i direction_i.
+
+    Parameters
+    ----------
+    directions : sequence of sequences
+        Direction of the force each nozzle makes, one row a nozzle; made unit vectors.
+    max_thrust : float or sequence of float
+        Largest thrust [N], one number or one a nozzle.
+    specific_impulse, exhaust_velocity, dry_mass
+        As for `Engine`.
+    """
+
+    directions: tuple
+    max_thrust: float | tuple
+    specific_impulse: float | None = None
+    exhaust_velocity: float | None = None
+    dry_mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        rows = [vector(f"directions[{i}]", row, "-") for i, row in enumerate(entries(self.directions) or ())]
+        if not rows or len({len(row) for row in rows}) != 1 or not all(np.any(row) for row in rows):
+            raise ValueError(
+                f"Nozzles: directions must be nonzero rows of one length; got {short(self.directions)}"
+            )
+        unit = tuple(tuple(float(x) for x in np.array(row) / np.linalg.norm(row)) for row in rows)
+        object.__setattr__(self, "directions", unit)
+        given = entries(self.max_thrust)
+        thrusts = (self.max_thrust,) * len(rows) if given is None else given
+        if len(thrusts) != len(rows):
+            raise ValueError(
+                f"Nozzles: max_thrust has {len(thrusts)} entries but there are {len(rows)} directions; "
+                f"give one number [N] or {len(rows)}"
+            )
+        checked = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
+        object.__setattr__(self, "max_thrust", checked)
+        self._check_exhaust(self.specific_impulse)
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("exhaust_velocity",) if self.burns else ()
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.burns, self.directions
+
+    def check_dimension(self, dimension: int) -> None:
+        if len(self.directions[0]) != dimension:
+            raise ValueError(
+                f"Nozzles: directions have {len(self.directions[0])} entries but the problem has {dimension} "
+                f"dimensions; give {dimension} entries each"
+            )
+
+    def size(self, dimension: int) -> int:
+        return len(self.directions)
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return tuple(f"nozzle_{i + 1}" for i in range(len(self.directions)))
+
+    def force(self, u: Any) -> Any:
+        return ca.DM(np.array(self.directions).T) @ u
+
+    def throttle(self, u: Any) -> Any:
+        return ca.sum1(u)
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(self.directions)), np.array(self.max_thrust)
+
+    def force_limit(self) -> float:
+        return float(np.max(self.max_thrust))
+
+    def words(self) -> str:
+        return (
+            f"{len(self.directions)} fixed nozzles of at most {self.force_limit():g} N{self._burning_words()}"
+        )

@@ -1,0 +1,93 @@
+"""Forces without propellant: free, limited along each axis, limited in magnitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import limits
+from dmoc.scene.actuator import Actuator
+from dmoc.scene.engines import Engine
+from dmoc.scene.rows import Row
+
+
+@dataclass(frozen=True)
+class FreeForce(Actuator):
+    """Any force, without a limit [N]."""
+
+
+@dataclass(frozen=True)
+class BoxForce(Actuator):
+    """A force limited along each axis: |F_i| <= limit_i.
+
+    Parameters
+    ----------
+    limit : float or sequence of float
+        Largest force [N], one number or one for each axis.
+    """
+
+    limit: float | tuple
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", limits("limit", self.limit, "N"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if isinstance(self.limit, tuple) and len(self.limit) != dimension:
+            raise ValueError(
+                f"BoxForce: limit has {len(self.limit)} entries but the problem has {dimension} dimensions; "
+                f"give one number or {dimension}"
+            )
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        limit = np.broadcast_to(np.asarray(self.limit, float), (dimension,)).copy()
+        return -limit, limit
+
+    def metered(self, dimension: int) -> Actuator:
+        limits = np.broadcast_to(np.asarray(self.limit, float), (dimension,))
+        return Engine(float(np.linalg.norm(limits)), box=self.limit)
+
+    def force_limit(self) -> float:
+        return float(np.max(self.limit))
+
+    def words(self) -> str:
+        return f"a force with each component within {self.limit} N"
+
+
+@dataclass(frozen=True)
+class BallForce(Actuator):
+    """A force of limited magnitude in any direction: |F| <= limit.
+
+    Parameters
+    ----------
+    limit : float
+        Largest force [N].
+    """
+
+    limit: float
+    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
+
+    def __post_init__(self) -> None:
+        value = limits("limit", self.limit, "N")
+        if isinstance(value, tuple):
+            raise ValueError(
+                f"BallForce: limit must be one number [N], the radius of the ball; got {self.limit!r}"
+            )
+        object.__setattr__(self, "limit", value)
+
+    def rows(self, u: Any) -> list[Row]:
+        return [Row("magnitude", ca.dot(u, u) / self.limit**2, -np.inf, 1.0)]
+
+    def metered(self, dimension: int) -> Actuator:
+        return Engine(self.limit)
+
+    def force_limit(self) -> float:
+        return self.limit
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, np.linalg.norm(u, axis=1) - self.limit)
+
+    def words(self) -> str:
+        return f"a force in any direction of at most {self.limit:g} N"

@@ -1,0 +1,250 @@
+"""What is minimised or maximised."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+
+from dmoc.basics.arguments import entries, number, short, vector, whole
+from dmoc.scene.actuator import Actuator
+
+
+class Objective(ABC):
+    """The integral of `running` over time plus `terminal` at the goal.
+
+    A user's own objective overrides either. `u` are the controls, for a force actuator the force [N].
+    Objectives add up: `0.5 * Effort() + 2 * Time()`; one that is maximised is taken away from one
+    that is minimised: `Effort() - 3 * FinalMass()`.
+
+    Attributes
+    ----------
+    unit : str
+    sense : int
+        1 if it is minimised, -1 if it is maximised. Its value is reported with its own sign either
+        way; multipliers are those of the minimisation of `sense` times the objective.
+    metered : bool
+        Whether it needs the magnitude of the force among the controls.
+    """
+
+    unit: ClassVar[str] = ""
+    sense: ClassVar[int] = 1
+    metered: ClassVar[bool] = False
+    adjustable: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def terms(self) -> tuple[tuple[float, Objective], ...]:
+        """The objectives this one is the sum of, each with its weight."""
+        return ((1.0, self),)
+
+    def __mul__(self, weight: float) -> WeightedSum:
+        return WeightedSum(tuple((number("weight", weight, "") * w, term) for w, term in self.terms))
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: Objective) -> WeightedSum:
+        if not isinstance(other, Objective):
+            raise ValueError(f"only objectives can be added to an objective; got {short(other)}")
+        return WeightedSum((*self.terms, *other.terms))
+
+    def __sub__(self, other: Objective) -> WeightedSum:
+        if not isinstance(other, Objective):
+            raise ValueError(f"only objectives can be taken away from an objective; got {short(other)}")
+        return WeightedSum((*self.terms, *(-1.0 * other).terms))
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the objective has no meaning in this many dimensions."""
+
+    def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        """Cost per second."""
+        return 0
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        """Cost of the state at the goal."""
+        return 0
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        """Cost per second where it depends on what the actuator makes of its controls."""
+        return self.running(t, q, v, u, m)
+
+    def unit_with(self, actuator: Actuator) -> str:
+        """The unit of the objective with this actuator."""
+        return self.unit
+
+    @property
+    def label(self) -> str:
+        """What it is, such as `final mass`."""
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
+
+    def words(self) -> str:
+        """One line for a person."""
+        return (type(self).__doc__ or type(self).__name__).strip().splitlines()[0]
+
+
+@dataclass(frozen=True)
+class Effort(Objective):
+    """Least effort: 1/2 integral of |F|^2 dt [N^2 s]."""
+
+    unit: ClassVar[str] = "N^2 s"
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        force = actuator.force(u)
+        return 0.5 * ca.dot(force, force)
+
+
+@dataclass(frozen=True)
+class Fuel(Objective):
+    """Least fuel: the propellant burnt [kg], or without an exhaust velocity the integral of |F| dt [N s]."""
+
+    unit: ClassVar[str] = "kg"
+    metered: ClassVar[bool] = True
+
+    def unit_with(self, actuator: Actuator) -> str:
+        return "kg" if actuator.burns else "N s"
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return actuator.flow(u) if actuator.burns else actuator.throttle(u)
+
+
+@dataclass(frozen=True)
+class Time(Objective):
+    """Least time: the duration [s]. Needs a limited force and a duration given as (shortest, longest)."""
+
+    unit: ClassVar[str] = "s"
+
+    def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return 1.0
+
+
+@dataclass(frozen=True)
+class FinalMass(Objective):
+    """Largest final mass [kg]. Needs an actuator that burns propellant."""
+
+    unit: ClassVar[str] = "kg"
+    sense: ClassVar[int] = -1
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return m
+
+
+@dataclass(frozen=True)
+class FinalRadius(Objective):
+    """Largest distance from a centre at the goal [m].
+
+    Parameters
+    ----------
+    center : sequence of float, optional
+        [m]; the origin if not given.
+    """
+
+    center: tuple | None = None
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+
+    def __post_init__(self) -> None:
+        if self.center is not None:
+            object.__setattr__(self, "center", vector("center", self.center, "m"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.center is not None and len(self.center) != dimension:
+            raise ValueError(
+                f"FinalRadius: center has {len(self.center)} entries but the problem has {dimension} dimensions"
+            )
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        offset = q if self.center is None else q - ca.DM(self.center)
+        return ca.sqrt(ca.dot(offset, offset))
+
+
+@dataclass(frozen=True)
+class FinalHeight(Objective):
+    """Largest coordinate along one axis at the goal [m].
+
+    Parameters
+    ----------
+    axis : int
+        Which one, counted from 0; the last if not given.
+    """
+
+    axis: int = -1
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", whole("FinalHeight: axis", self.axis, least=-3))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.axis not in range(-dimension, dimension):
+            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {short(self.axis)}")
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return q[self.axis]
+
+
+@dataclass(frozen=True)
+class WeightedSum(Objective):
+    """A sum of objectives with weights; made by adding objectives and multiplying them by numbers.
+
+    Parameters
+    ----------
+    parts : tuple of (float, Objective)
+        Weights and objectives. All must pull the same way: what is maximised needs the opposite sign
+        of what is minimised.
+    """
+
+    parts: tuple[tuple[float, Objective], ...]
+
+    def __post_init__(self) -> None:
+        pairs = [entries(part) or () for part in entries(self.parts) or ()]
+        if not pairs or any(len(pair) != 2 or not isinstance(pair[1], Objective) for pair in pairs):
+            raise ValueError(f"WeightedSum: parts must be pairs (weight, objective); got {short(self.parts)}")
+        parts = tuple((number("weight", weight, ""), term) for weight, term in pairs)
+        object.__setattr__(self, "parts", parts)
+        pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
+        if len(pulls) > 1:
+            raise ValueError(
+                f"the sum {self.formula} pulls two ways: subtract what is maximised from what is minimised, "
+                "as in Effort() - 2 * FinalMass()"
+            )
+
+    @property
+    def terms(self) -> tuple[tuple[float, Objective], ...]:
+        return self.parts
+
+    @property
+    def sense(self) -> int:  # type: ignore[override]
+        return -1 if any(weight * term.sense < 0 for weight, term in self.parts) else 1
+
+    @property
+    def metered(self) -> bool:  # type: ignore[override]
+        return any(term.metered for _, term in self.parts)
+
+    @property
+    def formula(self) -> str:
+        """Such as `0.5 Effort + 2 Time`."""
+        sizes = ["" if abs(weight) == 1 else f"{abs(weight):g} " for weight, _ in self.parts]
+        words = [
+            f"{'-' if weight < 0 else '+'} {size}{type(term).__name__}"
+            for size, (weight, term) in zip(sizes, self.parts, strict=True)
+        ]
+        return " ".join(words).removeprefix("+ ")
+
+    def check_dimension(self, dimension: int) -> None:
+        for _, term in self.parts:
+            term.check_dimension(dimension)
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return sum(weight * term.rate(actuator, t, q, v, u, m) for weight, term in self.parts if weight)
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return sum(weight * term.terminal(t, q, v, m) for weight, term in self.parts if weight)
+
+    def unit_with(self, actuator: Actuator) -> str:
+        units = {term.unit_with(actuator) for weight, term in self.parts if weight}
+        return units.pop() if len(units) == 1 else ""
+
+    def words(self) -> str:
+        return ("Least " if self.sense > 0 else "Largest ") + self.formula

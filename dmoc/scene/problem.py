@@ -1,0 +1,241 @@
+"""TransferProblem: the physics of one transfer, put together and checked when made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import entries, number, short
+from dmoc.effects.base import Conservative, Effect
+from dmoc.effects.motion import evaluated
+from dmoc.scene.actuator import Actuator
+from dmoc.scene.constraints import Constraint
+from dmoc.scene.ends import Boundary
+from dmoc.scene.forces import FreeForce
+from dmoc.scene.objectives import Effort, FinalMass, Objective, Time
+from dmoc.scene.rows import Row
+
+
+@dataclass(frozen=True)
+class TransferProblem:
+    """Move a body from `start` to `goal` under `effects`, pushed by `actuator`, at the least `objective`.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the body at the start [kg].
+    start, goal : Boundary
+        Where the transfer starts and ends, for example `State(position, velocity)` in m and m/s.
+    duration : float or (float, float)
+        Time of the transfer [s]; a pair (shortest, longest) leaves it free between the two.
+    effects : sequence of Effect
+        What acts on the body. What is not listed costs nothing.
+    actuator : Actuator
+        What pushes it.
+    objective : Objective
+        What is minimised, or maximised as `FinalMass` is.
+    constraints : sequence of Constraint
+        What is forbidden on the way.
+    guess : callable, tuple of arrays or Solution, optional
+        Starting guess of the path: a function of the time [s] that gives the position [m], a pair
+        (times, positions) of shapes (count,) and (count, dimension), or a former solution.
+    start_time : float
+        Time at the start [s].
+    name, parameters
+        Provenance, set when the problem is loaded from a file.
+
+    Raises
+    ------
+    ValueError
+        If a number has no meaning or two parts do not fit together.
+    """
+
+    mass: float
+    start: Boundary
+    goal: Boundary
+    duration: float | tuple[float, float]
+    effects: tuple[Effect, ...] = ()
+    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+    objective: Objective = Effort()  # noqa: RUF009 - immutable
+    constraints: tuple[Constraint, ...] = ()
+    guess: Any = None
+    start_time: float = 0.0
+    name: str = field(default="problem", compare=False)
+    parameters: dict = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", number("mass", self.mass, "kg", positive=True))
+        object.__setattr__(self, "duration", _duration(self.duration))
+        object.__setattr__(self, "start_time", number("start_time", self.start_time, "s"))
+        object.__setattr__(self, "effects", _parts("effects", self.effects, Effect))
+        object.__setattr__(self, "constraints", _parts("constraints", self.constraints, Constraint))
+        for name, kind in (
+            ("start", Boundary),
+            ("goal", Boundary),
+            ("actuator", Actuator),
+            ("objective", Objective),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        self._complete_ends()
+        if self.objective.metered:
+            object.__setattr__(self, "actuator", self.actuator.metered(self.dimension))
+        if self.start.dimension != self.goal.dimension:
+            raise ValueError(
+                f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
+            )
+        parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
+        for part in parts:
+            part.check_dimension(self.dimension)
+        self._check_clock()
+        _check_functions(self)
+        self._check_objective()
+        self._check_ends()
+        if self.actuator.dry_mass >= self.mass:
+            raise ValueError(
+                f"the actuator's dry_mass must be less than the mass; got {self.actuator.dry_mass:g} "
+                f"and {self.mass:g} kg"
+            )
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes, 1 to 3."""
+        return self.start.dimension
+
+    @property
+    def adjustable_parts(self) -> tuple:
+        """Parts with numbers that may change from one solve to the next without a rebuild."""
+        return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+
+    @property
+    def limited(self) -> bool:
+        """Whether there are inequalities: limits of the actuator or constraints."""
+        return bool(self.constraints) or self.actuator.force_limit() is not None
+
+    @property
+    def free_duration(self) -> bool:
+        """Whether the duration is found by the optimisation."""
+        return isinstance(self.duration, tuple)
+
+    @property
+    def duration_bounds(self) -> tuple[float, float]:
+        """Shortest and longest duration [s]; equal if it is fixed."""
+        return self.duration if isinstance(self.duration, tuple) else (self.duration, self.duration)
+
+    def _complete_ends(self) -> None:
+        """An end that works in any number of axes takes it from the other end."""
+        dimension = self.start.dimension or self.goal.dimension
+        if not dimension:
+            raise ValueError(
+                "neither start nor goal says how many axes there are; give one of them a center, "
+                "for example center=(0, 0)"
+            )
+        for end in ("start", "goal"):
+            object.__setattr__(self, end, getattr(self, end).with_dimension(dimension))
+
+    def _check_clock(self) -> None:
+        """Times of a transfer must differ by more than the rounding of the clock."""
+        shortest = self.duration_bounds[0]
+        if shortest < 1e4 * np.spacing(abs(self.start_time)):
+            raise ValueError(
+                f"start_time {self.start_time:g} s is too late to tell times within {shortest:g} s apart; "
+                "count time from nearer"
+            )
+
+    def _check_ends(self) -> None:
+        """A boundary state that breaks a constraint can never be met, whatever the path."""
+        for end in ("start", "goal"):
+            position, velocity = getattr(self, end).fixed()
+            for i, constraint in enumerate(self.constraints):
+                known = velocity if constraint.unit == "m/s" else position
+                if np.isnan(known).any():
+                    continue
+                excess = float(constraint.excess(position[None], velocity[None])[0])
+                if excess > 1e-9 * (np.abs(known).max() or 1.0):
+                    name = f"{type(constraint).__name__} (constraint {i + 1})"
+                    raise ValueError(
+                        f"{end} breaks {name} by {excess:.3g} {constraint.unit}: "
+                        f"the body {constraint.words()}; move the {end} or the constraint"
+                    )
+
+    def _check_objective(self) -> None:
+        sought = [type(term) for weight, term in self.objective.terms if weight]
+        if FinalMass in sought and not self.actuator.burns:
+            raise ValueError(
+                f"the final mass is always {self.mass:g} kg with {type(self.actuator).__name__}; "
+                "use an actuator that burns propellant, Engine(max_thrust, specific_impulse)"
+            )
+        if set(sought) != {Time}:
+            return
+        if not self.free_duration:
+            given = self.duration_bounds[0]
+            raise ValueError(
+                f"least time needs a free duration; got {given:g} s: give (shortest, longest), "
+                f"for example ({0.1 * given:g}, {10 * given:g})"
+            )
+        if self.actuator.force_limit() is None:
+            raise ValueError(
+                "least time without a force limit has no optimum (the duration goes to 0 s); "
+                "use BoxForce(limit) or BallForce(limit)"
+            )
+
+
+def _check_functions(problem: TransferProblem) -> None:
+    """What parts of the user's own give has to have the right number of entries."""
+    n, actuator = problem.dimension, problem.actuator
+    t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
+    u = ca.SX.sym("u", actuator.size(n))
+    functions: list[tuple[Any, str, list, int]] = [(actuator, "force", [u], n)]
+    for effect in problem.effects:
+        single = isinstance(effect, Conservative)
+        functions.append((effect, "lagrangian" if single else "force", [t, q, v, m], 1 if single else n))
+    for _, term in problem.objective.terms:
+        functions += [(term, "running", [t, q, v, u, m], 1), (term, "terminal", [t, q, v, m], 1)]
+    for part, name, given, needed in functions:
+        if _is_users(part):
+            words, method = f"{type(part).__name__}.{name}", getattr(part, name)
+            found = evaluated(words, method, given, "write it with casadi's functions").numel()
+            if found != needed:
+                raise ValueError(f"{words} must give {needed} values in {n} dimensions; it gives {found}")
+    limits: list[tuple[Any, str, list]] = [(actuator, "rows", [u])]
+    for constraint in problem.constraints:
+        limits += [(constraint, "rows", [t, q, u, m]), (constraint, "speed_rows", [v])]
+    for part, name, given in limits:
+        rows = getattr(part, name)(*given) if _is_users(part) else []
+        if not isinstance(rows, (list, tuple)) or not all(isinstance(row, Row) for row in rows):
+            raise ValueError(
+                f"{type(part).__name__}.{name} must give a list of dmoc.Row; it gives {short(rows)}"
+            )
+
+
+def _is_users(part: Any) -> bool:
+    return not type(part).__module__.startswith("dmoc.")
+
+
+def _duration(value: Any) -> float | tuple[float, float]:
+    ends = entries(value)
+    if ends is None:
+        return number("duration", value, "s", positive=True)
+    if len(ends) != 2:
+        raise ValueError(f"duration must be one number or (shortest, longest) [s]; got {short(value)}")
+    shortest = number("duration's shortest", ends[0], "s", positive=True)
+    longest = number("duration's longest", ends[1], "s", positive=True)
+    if shortest >= longest:
+        raise ValueError(
+            f"duration's shortest must be less than its longest; got {shortest:g} and {longest:g} s"
+        )
+    return shortest, longest
+
+
+def _parts(name: str, value: Any, kind: type) -> tuple:
+    parts = (value,) if isinstance(value, kind) else value
+    if isinstance(parts, str) or not isinstance(parts, Sequence):
+        raise ValueError(f"{name} must be a sequence of dmoc.{kind.__name__}; got {short(value)}")
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ValueError(f"{name} must hold only dmoc.{kind.__name__} objects; got {short(part)}")
+    return tuple(parts)

@@ -1,0 +1,276 @@
+"""Problem files: found by name, read, and made into transfer problems.
+
+A problem file is Python with one function `problem(**parameters)`, all of whose parameters have
+defaults, that returns a `TransferProblem`. Its docstring documents them as `name : type [unit]`.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import hashlib
+import inspect
+import linecache
+import sys
+import traceback
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from dmoc.basics.docstrings import documented, first_line
+
+if TYPE_CHECKING:
+    from dmoc.scene.problem import TransferProblem
+
+FUNCTION = "problem"
+# What the modules of problem files are called, before the file's own name.
+MODULE = "dmoc_problem_"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a problem file, with what the docstring says of it."""
+
+    name: str
+    default: Any
+    unit: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class ProblemFile:
+    """A problem file that was read.
+
+    Attributes
+    ----------
+    name : str
+        The file's name without `.py`.
+    parameters : tuple of Parameter
+        The keyword defaults of its function.
+    source_hash : str
+        SHA-256 of the file.
+    """
+
+    name: str
+    path: Path
+    docstring: str
+    parameters: tuple[Parameter, ...]
+    source_hash: str
+    function: Callable[..., Any] = field(repr=False, compare=False)
+
+    def make(self, **values: Any) -> TransferProblem:
+        """The transfer problem, with these values in place of the defaults.
+
+        Raises
+        ------
+        ValueError
+            If there is no such parameter, a value has another type than the default, or the file fails.
+        """
+        from dmoc.scene.problem import TransferProblem
+
+        for name, value in values.items():
+            _check_type(name, value, self.parameter(name).default)
+        made = _guarded(self.path, lambda: self.function(**values))
+        if not isinstance(made, TransferProblem):
+            raise ValueError(
+                f"{self.path}: {FUNCTION}() must return a dmoc.TransferProblem; it returned {_short(made)}"
+            )
+        chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
+        return replace(made, name=self.name, parameters=chosen)
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of this name; ValueError if there is none."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        if name in known:
+            return known[name]
+        listing = ", ".join(known) or "none"
+        raise ValueError(f"{self.name} has no parameter {name!r}{_nearest(name, known)}; it has: {listing}")
+
+
+def folders() -> list[Path]:
+    """Where names are looked for: `./problems`, then `problems` beside the package."""
+    return [Path("problems"), Path(__file__).resolve().parents[2] / "problems"]
+
+
+def catalogue() -> list[tuple[str, str]]:
+    """(name, first line of the docstring) of every problem file, without running any."""
+    found: dict[str, str] = {}
+    for path in _files():
+        if path.stem not in found:
+            found[path.stem] = _summary(path)
+    return sorted(found.items())
+
+
+def has_problem(name: str) -> bool:
+    """Whether one of the problem folders has a file of this name."""
+    return any(path.stem == name for path in _files())
+
+
+def find(name: str) -> Path:
+    """The problem file for a name or a path.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if name.endswith(".py") or "/" in name:
+        path = Path(name)
+        if not path.is_file():
+            raise ValueError(f"there is no problem file {name}; give a path to a .py file or a name")
+        return path
+    paths = {path.stem: path for path in reversed(_files())}
+    if name in paths:
+        return paths[name]
+    hint = _nearest(name, paths) or f"; there are: {', '.join(sorted(paths)) or 'none'}"
+    raise ValueError(f"there is no problem {name!r}{hint}; dmoc list shows all, or give a path to a .py file")
+
+
+def load_problem(name: str) -> ProblemFile:
+    """Read and run a problem file, given by name or path.
+
+    Raises
+    ------
+    ValueError
+        If it is not there, fails, or has no function `problem` with defaults for all its parameters.
+    """
+    path = find(str(name))
+    source = path.read_bytes()
+    module = _guarded(path, lambda: _run(path, source))
+    function = getattr(module, FUNCTION, None)
+    if not callable(function):
+        raise ValueError(f"{path} has no function {FUNCTION}(); add one that returns a dmoc.TransferProblem")
+    entries = documented(inspect.getdoc(function))
+    parameters = []
+    for name, given in inspect.signature(function).parameters.items():
+        if given.default is inspect.Parameter.empty:
+            raise ValueError(f"{path}: parameter {name!r} of {FUNCTION}() has no default; give it one")
+        unit, description = (entries[name].unit, entries[name].description) if name in entries else ("", "")
+        parameters.append(Parameter(name, given.default, unit, description))
+    docstring = inspect.cleandoc(module.__doc__ or "") or (inspect.getdoc(function) or "")
+    digest = hashlib.sha256(source).hexdigest()
+    return ProblemFile(path.stem, path, docstring, tuple(parameters), digest, function)
+
+
+def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
+    """Values from texts such as `mass=2.5` or `goal=(8, 1, 1)`, parsed as Python literals.
+
+    Raises
+    ------
+    ValueError
+        If a text is not of this form.
+    """
+    values: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        name = name.strip()
+        if not equals or not name.isidentifier():
+            raise ValueError(f"--set {setting!r} is not of the form name=value, for example --set mass=2.5")
+        if name in values:
+            raise ValueError(f"--set gives {name!r} twice; give it once")
+        try:
+            values[name] = ast.literal_eval(text.strip())
+        except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+            raise ValueError(
+                f"--set {name}: {_short(text)} is not a Python literal; write a number without a unit (2.5), "
+                "a tuple ('(8, 1, 1)'), True, None or a quoted text"
+            ) from None
+    return values
+
+
+def _files() -> list[Path]:
+    """All problem files, those found first in front."""
+    return [
+        path
+        for folder in folders()
+        for path in sorted(folder.glob("*.py"))
+        if path.stem.isidentifier() and not path.stem.startswith("_")
+    ]
+
+
+def _summary(path: Path) -> str:
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError) as error:
+        return f"(not valid Python: {_one_line(error)})"
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == FUNCTION]
+    if not functions:
+        return f"(has no function {FUNCTION})"
+    return first_line(ast.get_docstring(tree) or ast.get_docstring(functions[0]))
+
+
+def _run(path: Path, source: bytes) -> ModuleType:
+    # Dataclasses and pickle look a class's module up by name, so it has to be there.
+    module = ModuleType(f"{MODULE}{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
+    linecache.checkcache(str(path))
+    exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
+    return module
+
+
+def _guarded(path: Path, call: Callable[[], Any]) -> Any:
+    """What the user's code returns; its exceptions become one line that names the user's own line."""
+    try:
+        return call()
+    except (Exception, SystemExit) as error:
+        number, text = _user_line(path, error)
+        where = f"{path}, line {number} ({text})" if text else f"{path}, line {number}"
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ValueError(f"{where}: {kind}{_one_line(error)}") from error
+
+
+def users_line(error: BaseException) -> str:
+    """Where in a problem file an exception of a solve comes from, ` (FILE, line N: TEXT)`; else nothing."""
+    begun: BaseException | None = error
+    while begun is not None:
+        for frame in reversed(traceback.extract_tb(begun.__traceback__)):
+            module = sys.modules.get(f"{MODULE}{Path(frame.filename).stem}")
+            known = module is not None and module.__file__ == frame.filename
+            if known and frame.filename not in str(error):
+                return f" ({frame.filename}, line {frame.lineno}: {frame.line})"
+        begun = begun.__cause__
+    return ""
+
+
+def _user_line(path: Path, error: BaseException) -> tuple[int, str]:
+    """Number and text of the line of the problem file where an exception came from."""
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return error.lineno or 1, (error.text or "").strip()
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    # a call over several lines begins with a parenthesis that closes elsewhere
+    return (frames[-1].lineno or 1, (frames[-1].line or "").strip().rstrip("(")) if frames else (1, "")
+
+
+def _check_type(name: str, value: Any, default: Any) -> None:
+    """ValueError unless a value could stand where the default stands; a default of None takes anything."""
+    if default is None:
+        return
+    kinds: tuple[type, ...] = (type(default),)
+    if isinstance(default, float):
+        kinds = (int, float)
+    elif isinstance(default, (tuple, list)):
+        kinds = (tuple, list)
+    wrong_bool = isinstance(value, bool) and not isinstance(default, bool)
+    if wrong_bool or not isinstance(value, kinds):
+        raise ValueError(
+            f"{name} must be of type {type(default).__name__} like its default {_short(default)}; "
+            f"got {_short(value)}"
+        )
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    return f" (did you mean {' or '.join(near)}?)" if near else ""
+
+
+def _short(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _one_line(error: BaseException) -> str:
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    return " ".join(text.split()) or type(error).__name__

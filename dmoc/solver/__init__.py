@@ -1,0 +1,1 @@
+"""Coarse to fine, to a tolerance, and why it failed."""

@@ -1,0 +1,177 @@
+"""What is wrong with one iterate, by name: values that are not finite, and rows that do not hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.effects.base import Conservative, Effect
+from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.mesh import Guess, node_weights
+from dmoc.nlp.layout import Group
+from dmoc.nlp.transcription import NLP
+from dmoc.scene.constraints import Constraint, KeepOut, SpeedLimit
+from dmoc.scene.problem import TransferProblem
+
+# Rows that are told of, and the scaled violation from which one is.
+COUNT, SEEN = 10, 1e-9
+
+
+def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess: Guess) -> None:
+    """Refuse a guess at which an effect has no value.
+
+    Raises
+    ------
+    ValueError
+        With the effect, the node and what it looked at there.
+    """
+    with np.errstate(all="ignore"):
+        state = _states(problem, guess)
+        if not all(np.isfinite(value.full()).all() for value in dynamics.point(*state)):
+            raise ValueError(_undefined_effect(problem, state))
+
+
+def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: Guess) -> None:
+    """Refuse a guess at which the objective, a row or one of their derivatives has no value.
+
+    Raises
+    ------
+    ValueError
+        With its name.
+    """
+    x, p, parts = nlp.pack(guess), nlp.parameters(problem), nlp.assembly
+    slopes, entries = parts.gradient(x, p)[1], parts.jacobian(x, p)[1]
+    rows = np.isfinite(parts.constraints(x, p).full().ravel())
+    np.logical_and.at(rows, entries.sparsity().row(), np.isfinite(entries.nonzeros()))
+    cost = np.concatenate([parts.objective(x, p).full().ravel(), slopes.full().ravel()])
+    if rows.all() and np.isfinite(cost).all():
+        return
+    objective = f"the objective {type(problem.objective).__name__}"
+    name = objective if rows.all() else nlp.rows.name_of(int(np.argmin(rows)))
+    raise ValueError(f"{name} or its derivative is not a finite number at the guess; {REMEDY}")
+
+
+REMEDY = "stay where it is defined, or give another guess"
+
+
+def _states(problem: TransferProblem, guess: Guess) -> tuple[np.ndarray, ...]:
+    """Times, positions, velocities, masses of the nodes of a guess, side by side."""
+    times = problem.start_time + guess.duration * guess.fractions
+    velocity = np.gradient(guess.position, times, axis=0)
+    velocity[0], velocity[-1] = guess.start_velocity, guess.goal_velocity
+    return times[None], guess.position.T, velocity.T, guess.mass[None]
+
+
+def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
+    """Which effect has no value, and at which node."""
+    for effect in problem.effects:
+        point = Dynamics(problem.dimension, (effect,)).point(*state)
+        finite = np.isfinite(np.vstack([value.full() for value in point])).all(axis=0)
+        if not finite.all():
+            node = int(np.argmin(finite))
+            where = _arguments(effect, [part[:, node] for part in state])
+            place = {0: "at the start", finite.size - 1: "at the goal"}.get(
+                node, f"at node {node} of the guess"
+            )
+            return f"{type(effect).__name__} is not a finite number {place}: {where}; {REMEDY}"
+    return f"the effects together are not a finite number at the guess; {REMEDY}"
+
+
+def _arguments(effect: Effect, state: list[np.ndarray]) -> str:
+    """What an effect looks at, in words: the distance to its centre where that is 0."""
+    position = state[1]
+    center = getattr(effect, "center", None)
+    offset = position - (np.zeros(len(position)) if center is None else np.asarray(center, float))
+    symbols = state_symbols(len(position))
+    value = effect.lagrangian(*symbols) if isinstance(effect, Conservative) else effect.force(*symbols)  # type: ignore[attr-defined]
+    looks = [ca.depends_on(ca.SX(value), symbol) for symbol in symbols]
+    distance = float(np.linalg.norm(offset))
+    if looks[1] and distance <= 1e-12 * (1 + np.abs(position).max()):
+        return f"distance {distance:.2g} m from {_listed(position - offset)} m"
+    words = [
+        f"{name} {_listed(part)} {unit}"
+        for name, part, unit, look in zip(
+            ("time", "position", "velocity", "mass"), state, ("s", "m", "m/s", "kg"), looks, strict=True
+        )
+        if look
+    ]
+    return ", ".join(words)
+
+
+def _listed(values: np.ndarray) -> str:
+    text = ", ".join(f"{value:.6g}" for value in values)
+    return f"({text})" if len(values) > 1 else text
+
+
+def worst_in_units(nlp: NLP, problem: TransferProblem, x, g) -> tuple[tuple[str, float, str], ...]:
+    """The ten most violated rows and bounds, worst scaled violation first: name, violation, unit."""
+    lbx, ubx, lbg, ubg = nlp.bounds(problem)
+    excess = [
+        np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)
+        for value, low, high in ((np.ravel(g), lbg, ubg), (np.ravel(x), lbx, ubx))
+    ]
+    both, rows = np.concatenate(excess), nlp.rows.size
+    duration = nlp.unpack(x, problem).duration
+    found = []
+    for place in np.argsort(-both)[:COUNT]:
+        if both[place] > SEEN:
+            layout, at = (nlp.rows, place) if place < rows else (nlp.columns, place - rows)
+            group = next(group for group in layout.groups if at < group.stop)
+            index, component = divmod(int(at) - group.start, len(group.labels))
+            scale = group.scales[index, component]
+            if place < rows:
+                size, unit = _row(nlp, problem, group, index, component, both[place] / scale, duration)
+            else:
+                size, unit = both[place] * scale, _unit_of_unknown(problem, group, component)
+            found.append((group.name_of(at), float(size), unit))
+    return tuple(found)
+
+
+def _row(
+    nlp: NLP, problem: TransferProblem, group: Group, index: int, component: int, value: float, duration: float
+) -> tuple:
+    """A violation of a row as the NLP states it, in words of the problem: size and unit."""
+    if group.name == "dynamics":
+        # a row is a momentum per mass; over the node's share of the time, a force
+        weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
+        return value * problem.mass / weight, "N"
+    if group.name.startswith("mass_"):
+        return value, "kg"
+    constraint = _constraint(problem, group.name)
+    if isinstance(constraint, KeepOut):
+        return constraint.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
+    if isinstance(constraint, SpeedLimit):
+        return constraint.limit * (np.sqrt(1 + value) - 1), "m/s"
+    if group.name == "actuator":
+        limit = problem.actuator.force_limit() or 1.0
+        squared = group.labels[component] == "magnitude"
+        return limit * (np.sqrt(1 + value) - 1 if squared else value), "N"
+    return value, _unit(problem, group, component, constraint)
+
+
+def _unit_of_unknown(problem: TransferProblem, group: Group, component: int) -> str:
+    units = {"position": "m", "mass": "kg", "duration": "s", "start.velocity": "m/s", "goal.velocity": "m/s"}
+    return units.get(group.name) or problem.actuator.units(problem.dimension)[component]
+
+
+def _constraint(problem: TransferProblem, name: str) -> Constraint | None:
+    """The constraint that made a group of rows."""
+    if name.endswith(".speed"):
+        return next(limit for limit in problem.constraints if isinstance(limit, SpeedLimit))
+    number = name.rsplit("_", 1)[-1]
+    return problem.constraints[int(number) - 1] if number.isdigit() and "." not in name else None
+
+
+def _unit(problem: TransferProblem, group: Group, component: int, constraint: Constraint | None) -> str:
+    """The unit that a condition or a constraint of the user's states."""
+    n = problem.dimension
+    t, q, v, m = state_symbols(n)
+    if group.name.endswith(".condition"):
+        rows: Any = getattr(problem, group.name.split(".")[0]).rows(t, q, v, m)
+    elif constraint is not None:
+        rows = constraint.rows(t, q, ca.SX.sym("u", problem.actuator.size(n)), m) or constraint.speed_rows(v)
+    else:
+        return "-"
+    return rows[component].unit or "-" if component < len(rows) else "-"

@@ -1,0 +1,138 @@
+"""More than one answer: several starting guesses on a coarse mesh, and the distinct optima they lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.guess.coast import center_of, lone_attractor, windings_between
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.mesh import Guess
+from dmoc.nlp.transcription import check_mesh
+from dmoc.scene.constraints import KeepOut
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.ladder import COARSEST_NODES, Climb
+from dmoc.solver.solve import first_guess
+
+# Objectives closer than this, relative, on paths closer than this part of the extent, are one optimum.
+SAME_OBJECTIVE, SAME_PATH = 1e-4, 1e-2
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A local optimum on the coarse mesh.
+
+    Attributes
+    ----------
+    objective : float
+        In the objective's own unit.
+    path : Guess
+    starts : tuple of str
+        The guesses that led to it.
+    """
+
+    objective: float
+    path: Guess
+    starts: tuple[str, ...]
+
+
+def local_optima(
+    problem: TransferProblem,
+    starts: int,
+    order: int | None = None,
+    hold: bool = False,
+    guess: Any = None,
+) -> list[Optimum]:
+    """The distinct optima that `starts` guesses lead to, the best first.
+
+    The guesses are the default one, then with a lone attractor more and fewer revolutions, with
+    keep-out zones paths that bend around each on either side, then random bends. The same numbers
+    are drawn every time.
+    """
+    base = first_guess(problem, order, None, hold, guess)
+    if order or base.order == 2:
+        steps = max(COARSEST_NODES[True] // (base.order // 2), Climb(problem).least_steps(base))
+        base = starting_guess(problem, check_mesh(steps), base.order, hold, guess)
+    found: list[Optimum] = []
+    for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
+        climb = Climb(problem)
+        with climb.interrupt:
+            solved = climb.up_to(start, start)
+        if climb.answer.status == "stopped":
+            break
+        if solved:
+            _add(found, Optimum(climb.levels[-1].objective, climb.path, (name,)))
+    return sorted(found, key=lambda optimum: problem.objective.sense * optimum.objective)
+
+
+def _add(found: list[Optimum], new: Optimum) -> None:
+    """Put an optimum with its equals, or at the end."""
+    extent = np.ptp(new.path.position, axis=0).max() or 1.0
+    for i, old in enumerate(found):
+        near = abs(new.objective - old.objective) <= SAME_OBJECTIVE * abs(old.objective)
+        if near and np.abs(new.path.position - old.path.position).max() < SAME_PATH * extent:
+            found[i] = replace(old, starts=old.starts + new.starts)
+            return
+    found.append(new)
+
+
+def _variants(problem: TransferProblem, base: Guess) -> Iterator[tuple[str, Guess]]:
+    """Names and guesses, without end."""
+    yield "default", base
+    lone = lone_attractor(problem)
+    if lone is not None and problem.dimension > 1:
+        center = center_of(lone, problem.dimension)
+        ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
+        for turns in (1, -1, 2, -2):
+            windings = windings_between(problem, base.duration, ends, turns)
+            turned = center + _turned(base.position - center, turns * base.fractions)
+            position = windings[0][0](base.fractions) if windings else turned
+            yield f"{turns:+d} revolutions", replace(base, position=position)
+    for i, constraint in enumerate(problem.constraints):
+        if isinstance(constraint, KeepOut):
+            for side, bend in _around(base, np.array(constraint.center), constraint.radius):
+                yield (
+                    f"{side} of {type(constraint).__name__} {i + 1}",
+                    replace(base, position=base.position + bend),
+                )
+    draw = np.random.default_rng(0)
+    extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0
+    number = 0
+    while True:
+        number += 1
+        waves = np.sin(np.pi * np.outer(base.fractions, [1, 2]))
+        bend = waves @ draw.normal(size=(2, problem.dimension)) * 0.25 * extent
+        yield f"bend {number}", replace(base, position=base.position + bend)
+
+
+def _turned(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Positions around the origin, turned by so many revolutions in the plane of their motion."""
+    padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
+    normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)
+    normal = normal / (np.linalg.norm(normal) or 1.0)
+    angle = 2 * np.pi * turns[:, None]
+    # Rodrigues' formula
+    along = normal * (padded @ normal)[:, None]
+    turned = np.cos(angle) * padded + np.sin(angle) * np.cross(normal, padded) + (1 - np.cos(angle)) * along
+    return turned[:, : offset.shape[1]]
+
+
+def _around(base: Guess, center: np.ndarray, radius: float) -> Iterator[tuple[str, np.ndarray]]:
+    """Bends of a path, zero at its ends, that take it past a zone on either side of it."""
+    nearest = int(np.argmin(np.linalg.norm(base.position - center, axis=1)))
+    nearest = min(max(nearest, 1), len(base.position) - 2)
+    along = base.position[nearest + 1] - base.position[nearest - 1]
+    along = along / (np.linalg.norm(along) or 1.0)
+    across = np.eye(len(center)) - np.outer(along, along)
+    sides = [side / np.linalg.norm(side) for side in across if np.linalg.norm(side) > 0.5]
+    peak = base.fractions[nearest]
+    shape = np.where(base.fractions < peak, base.fractions / peak, (1 - base.fractions) / (1 - peak))
+    shape = np.sin(0.5 * np.pi * shape)[:, None]
+    gap = base.position[nearest] - center
+    for i, direction in enumerate(sides):
+        for sign in (1, -1):
+            reach = sign * 1.5 * radius * direction - gap
+            yield f"{'+' if sign > 0 else '-'}{i + 1} side", shape * (reach - along * (reach @ along))

@@ -1,0 +1,1 @@
+"""What accuracy, effects and long runs cost."""

@@ -1,0 +1,269 @@
+"""What accuracy costs in time: solves on many meshes, by orders and by other methods."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import number
+from dmoc.basics.memory import forget
+from dmoc.guess.starting import guess_on, starting_guess
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess, uniform_mesh
+from dmoc.motion.reference import reference as fly
+from dmoc.nlp.transcription import check_mesh
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.ladder import Climb
+from dmoc.solver.solve import solve
+from dmoc.solver.tolerance import path_scales
+from dmoc.studies.other_methods import Formulation as Formulation
+from dmoc.studies.other_methods import Method, Run, counted, solve_other
+
+STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 48, 96), 8: (8, 16, 32, 64)}
+OTHER_STEPS = (25, 50, 100, 200, 400)
+REFERENCE_STEPS = 100
+COLD, COMPILED = ", cold", ", compiled"
+TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One method on one mesh: how far off it was and what it took.
+
+    Attributes
+    ----------
+    method : str
+        "order 2" to "order 8" are dmoc's own, with ", cold" if without coarse meshes on the way
+        and ", compiled" if with functions as machine code.
+    order : int or None
+        None for other methods.
+    steps, nodes : int
+        Steps of the mesh and places on it where there is a control.
+    objective : float
+        [unit of the objective].
+    error : float
+        Relative error of the objective [-], no less than what the reference is known to.
+    path_error : float
+        How far an independent integrator, driven by the controls found, misses the goal that the
+        method believes to reach: of the path's extent or of its speed, whichever is more [-].
+    iterations, calls : int
+        Iterations of Ipopt and evaluations of functions and derivatives it asked for, on all meshes.
+    build_s, solve_s : float
+        Medians of the seconds spent in Ipopt, and before and after it.
+    coarse_to_fine : bool
+        Whether coarser meshes came first.
+    status : str
+        "solved", or why not.
+    """
+
+    method: str
+    order: int | None
+    steps: int
+    nodes: int
+    objective: float
+    error: float
+    path_error: float
+    iterations: int
+    calls: int
+    build_s: float
+    solve_s: float
+    coarse_to_fine: bool
+    status: str
+
+    @property
+    def seconds(self) -> float:
+        """Seconds from the problem to the answer."""
+        return self.build_s + self.solve_s
+
+
+def work_precision(
+    problem: TransferProblem,
+    orders: Sequence[int] = (2, 4, 6, 8),
+    steps: Sequence[int] | Mapping[str, Sequence[int]] | None = None,
+    repeats: int = 3,
+    against: Mapping[str, Method] | Sequence[tuple[str, Method]] = (),
+    reference: float | None = None,
+    cold: bool = False,
+    compiled: bool = False,
+    progress: Callable[[str], None] | None = None,
+    before: Callable[[], None] = forget,
+) -> list[Trial]:
+    """Solve a problem at several orders on several meshes, and measure error and time.
+
+    The repetitions take turns, so that whatever else the computer does falls on all solves alike.
+
+    Parameters
+    ----------
+    problem : TransferProblem
+    orders : sequence of int
+        Of 2, 4, 6, 8.
+    steps : sequence of int, or mapping, optional
+        Meshes, for all or by the method's name ("order 2", ...); by default 100 to 1600 steps at order 2,
+        and down to 8 to 64 at order 8.
+    repeats : int
+        How often each solve is timed; the median counts.
+    against : mapping or pairs
+        Other methods by name: functions of (problem, steps) that give a `Formulation`. They get the
+        options of dmoc's own solves, and a tolerance that is no tighter.
+    reference : float, optional
+        The true objective; by default that of order 8 on a fine mesh.
+    cold : bool
+        Also solve each mesh at each order from the starting guess alone.
+    compiled : bool
+        Also solve each with functions as machine code, see `solve`.
+    progress : callable
+        Called before every solve with what it is.
+    before : callable
+        Called before every solve, not timed. By default dmoc forgets the functions it has written down:
+        each solve is timed as the first one ever of its scene.
+
+    Returns
+    -------
+    list of Trial
+
+    Raises
+    ------
+    ValueError
+        If an argument has no meaning, or the problem cannot be solved for a reference.
+    """
+    if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
+        raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
+    meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
+    others = dict(against)
+    variants = [("", True), *([(COLD, False)] if cold else []), *([(COMPILED, True)] if compiled else [])]
+    runs: list[tuple[tuple, Callable[[], Run]]] = [
+        (
+            (name + variant, order, count, climbs),
+            partial(_own, problem, order, count, climbs, variant == COMPILED),
+        )
+        for order, (name, counts) in zip(orders, meshes.items(), strict=True)
+        for count in counts
+        for variant, climbs in variants
+    ]
+    runs += [
+        ((name, None, count, False), partial(solve_other, problem, name, others[name], count))
+        for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
+        for count in counts
+    ]
+    value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
+    rounds = [[_told(progress, labels, before, run) for labels, run in runs] for _ in range(repeats)]
+    scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
+    return [
+        _trial(problem, labels, timed, (value, doubt), scales)
+        for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
+    ]
+
+
+def _told(progress: Callable[[str], None] | None, labels: tuple, before: Callable, run: Callable) -> Run:
+    if progress is not None:
+        progress(f"{labels[0]}, {labels[2]} steps")
+    before()
+    return run()
+
+
+def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+    """Numbers of steps by the name of the method, checked."""
+    chosen = steps if isinstance(steps, Mapping) else {} if steps is None else dict.fromkeys(default, steps)
+    meshes = default | {name: tuple(chosen[name]) for name in default if name in chosen}
+    for count in (count for counts in meshes.values() for count in counts):
+        check_mesh(count)
+    return meshes
+
+
+def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: tuple) -> Trial:
+    (name, order, steps, climbs), (value, doubt) = labels, known
+    last, solve_s = timed[-1], median(run.solve_s for run in timed)
+    return Trial(
+        name,
+        order,
+        steps,
+        last.nodes,
+        last.objective,
+        max(abs(last.objective - value) / (abs(value) or 1.0), doubt),
+        _miss(problem, last.path, scales),
+        last.iterations,
+        last.calls,
+        median(run.seconds for run in timed) - solve_s,
+        solve_s,
+        climbs,
+        last.status,
+    )
+
+
+def best_known(problem: TransferProblem) -> tuple[float, float]:
+    """Objective by order 8 on a fine mesh, and how much it still changed from half as many steps, relative."""
+    half, full = (solve(problem, order=8, steps=count * REFERENCE_STEPS) for count in (1, 2))
+    if not full.success:
+        raise ValueError(f"no reference: order 8 on a fine mesh ended with {full.status!r}; give reference=...")
+    change = abs(half.objective - full.objective) / (abs(full.objective) or 1.0)
+    return full.objective, max(change, 1e-14)
+
+
+def time_to_reach(trials: Sequence[Trial], targets: Sequence[float] = TARGETS) -> dict[str, list[float | None]]:
+    """Seconds each method takes to an error, on the frontier of what was measured; None where not reached.
+
+    Between two solves the time is interpolated, logarithm over logarithm. Where already the fastest
+    solve is better than a target its time counts.
+    """
+    table: dict[str, list[float | None]] = {}
+    for name in dict.fromkeys(trial.method for trial in trials):
+        points = frontier([trial for trial in trials if trial.method == name])
+        table[name] = [_when(points, target) for target in targets]
+    return table
+
+
+def frontier(trials: Sequence[Trial]) -> list[Trial]:
+    """The solves that no faster one equals in accuracy, fastest first."""
+    best: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: trial.seconds):
+        if trial.status == "solved" and (not best or trial.error < best[-1].error):
+            best.append(trial)
+    return best
+
+
+def _when(points: list[Trial], target: float) -> float | None:
+    if points and points[0].error <= target:
+        return points[0].seconds
+    for before, after in pairwise(points):
+        if after.error <= target:
+            share = np.log(target / before.error) / np.log(after.error / before.error)
+            return float(before.seconds * (after.seconds / before.seconds) ** share)
+    return None
+
+
+def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compiled: bool = False) -> Run:
+    """One of dmoc's own solves, by way of coarser meshes or not."""
+
+    def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
+        begun = time.perf_counter()
+        climb = Climb(problem, options, compiled=compiled)
+        first = guess_on(problem, uniform_mesh(steps), order, False)
+        climb.up_to(first) if climbs else climb.solve_on(first)
+        return climb.solution(), time.perf_counter() - begun
+
+    try:
+        (found, seconds), calls = counted(solve_with)
+    except ValueError as error:
+        # a mesh beyond the limit of stability is refused, and the next one may not be
+        return Run(None, steps * order // 2 + 1, np.nan, f"refused: {error}", 0, 0, np.nan, np.nan)
+    facts = found.objective, found.status, found.iterations
+    return Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
+
+
+def _miss(problem: TransferProblem, path: Guess | None, scales: tuple[float, float]) -> float:
+    """By how much the independent integrator misses the goal of a path, of an extent [m] or speed [m/s]."""
+    if path is None or not np.isfinite(path.control).all():
+        return np.nan
+    dynamics = Dynamics.of(problem)
+    position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
+    gaps = np.linalg.norm(position - path.position[-1]), np.linalg.norm(velocity - path.goal_velocity)
+    return float(max(gaps[0] / scales[0], gaps[1] / scales[1]))

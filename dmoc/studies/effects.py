@@ -1,0 +1,172 @@
+"""What each effect does to a path and what it costs: whether the scene calls for it."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, fields, is_dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.docstrings import documented
+from dmoc.effects import (
+    J2,
+    ConicalShadow,
+    Drag,
+    Effect,
+    ExponentialAtmosphere,
+    PointGravity,
+    RadiationPressure,
+    ThirdBody,
+    circular_motion,
+)
+from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import Guess
+from dmoc.motion.momenta import end_momenta
+from dmoc.motion.reference import reference
+from dmoc.nlp.stencils import formulas_of
+from dmoc.nlp.transcription import transcribe_onto, units_of
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+
+REPEATS = 25
+EARTH_MU, EARTH_RADIUS, EARTH_RATE = 3.986004418e14, 6.378137e6, 7.2921159e-5
+SUN_DISTANCE, SUN_RATE = 1.495978707e11, 1.99098e-7
+
+
+@dataclass(frozen=True)
+class Influence:
+    """One effect on one path.
+
+    Attributes
+    ----------
+    effect : Effect
+    name : str
+        Its kind and numbers; what stands for it, such as the Moon, where the library chose them.
+    listed : bool
+        Whether the scene has it; otherwise the figures are what it would do.
+    acceleration : float
+        The largest along the path [m/s^2].
+    displacement : float
+        At the goal, between flying the same controls with it and without it [m].
+    instructions : int
+        What it adds to one evaluation of a node, a step and the ends, derivatives included.
+    time_share : float
+        Its share of the time to evaluate Jacobian and Hessian on the whole mesh, measured [-].
+    """
+
+    effect: Effect
+    name: str
+    listed: bool
+    acceleration: float
+    displacement: float
+    instructions: int
+    time_share: float
+
+
+def influences(solution: Solution, others: bool = False) -> list[Influence]:
+    """What each effect of a solved scene does and costs, and with `others` what the library's could do.
+
+    The others are for scenes around the Earth in SI units: J2, Sun and Moon on circular orbits, air
+    and sunlight on 0.01 m^2 a kg.
+    """
+    problem, path = solution.require_problem(), solution.path
+    found = [_one(problem, path, effect, _name(effect), listed=True) for effect in problem.effects]
+    missing = candidates(problem) if others else {}
+    return found + [_one(problem, path, effect, name, listed=False) for name, effect in missing.items()]
+
+
+def candidates(problem: TransferProblem) -> dict[str, Effect]:
+    """Effects of the library that could apply to a scene around the Earth and are not in it, by name."""
+    masses = [effect.mu for effect in problem.effects if isinstance(effect, PointGravity)]
+    if not any(abs(mu / EARTH_MU - 1) < 0.01 for mu in masses) or problem.dimension == 1:
+        return {}
+    sun = circular_motion(SUN_DISTANCE, SUN_RATE)
+    area = 0.01 * problem.mass
+    air = ExponentialAtmosphere(3.725e-12, 4e5, 5.8515e4, EARTH_RADIUS, EARTH_RATE)
+    library: dict[str, Effect] = {
+        "J2": J2(EARTH_MU, EARTH_RADIUS, 1.08263e-3),
+        "ThirdBody, the Moon": ThirdBody(4.9048695e12, circular_motion(3.844e8, 2.66170e-6)),
+        "ThirdBody, the Sun": ThirdBody(1.32712440018e20, sun),
+        f"Drag, area {area:.4g} m^2": Drag(area, 2.2, air),
+        f"RadiationPressure, area {area:.4g} m^2": RadiationPressure(
+            area, 0.3, sun, ConicalShadow(EARTH_RADIUS)
+        ),
+    }
+    return {name: new for name, new in library.items() if not any(_alike(new, old) for old in problem.effects)}
+
+
+def _alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects are of one kind, and of the same body if they are the pull of one."""
+    weights = (getattr(effect, "mu", 0.0) for effect in (one, other))
+    return type(one) is type(other) and math.isclose(*weights, rel_tol=0.01)
+
+
+def _name(effect: Effect) -> str:
+    """The effect's kind and those of its parameters that are numbers."""
+    known = documented(type(effect).__doc__)
+    words = [type(effect).__name__]
+    members: tuple = fields(effect) if is_dataclass(effect) else ()
+    for member in members:
+        if isinstance(value := getattr(effect, member.name), (int, float)):
+            unit = known[member.name].unit if member.name in known else ""
+            words.append(f"{member.name} {value:.4g} {unit}".rstrip(" -"))
+    return ", ".join(words)
+
+
+def _one(problem: TransferProblem, path: Guess, effect: Effect, name: str, listed: bool) -> Influence:
+    alone = tuple(other for other in problem.effects if other is not effect)
+    without = replace(problem, effects=alone)
+    scene = problem if listed else replace(problem, effects=(*problem.effects, effect))
+    ends = [
+        reference(Dynamics.of(case), path, case.start_time, path.start_velocity)[0] for case in (scene, without)
+    ]
+    more, less = (_instructions(case, path) for case in (scene, without))
+    slow, fast = _seconds(path, scene, without)
+    return Influence(
+        effect,
+        name,
+        listed,
+        _largest_acceleration(problem, path, effect),
+        float(np.linalg.norm(ends[0] - ends[1])),
+        more - less,
+        max(0.0, 1 - fast / slow),
+    )
+
+
+def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect) -> float:
+    """Largest change of the acceleration by one effect along the path, at the step ends [m/s^2]."""
+    n = problem.dimension
+    t, q, v, m = state_symbols(n)
+    still = ca.DM.zeros(n)
+    alone = Dynamics(n, (effect,), problem.actuator).acceleration(t, q, v, m, still)
+    function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
+    ends = slice(None, None, scheme(path.order).degree)
+    times = problem.start_time + path.duration * path.mesh
+    _, velocity = end_momenta(Dynamics.of(problem), path, problem.start_time)
+    pulls = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
+    return float(np.linalg.norm(pulls, axis=0).max())
+
+
+def _instructions(problem: TransferProblem, path: Guess) -> int:
+    """Instructions of one evaluation of node, step and ends with their derivatives."""
+    kernels = [stencil.kernel for stencil in formulas_of(problem, path.order, path.hold).stencils]
+    return sum(part.n_instructions() for kernel in kernels for part in kernel.functions.values())
+
+
+def _seconds(path: Guess, *problems: TransferProblem) -> np.ndarray:
+    """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s]; they take turns."""
+    taken = np.empty((REPEATS, len(problems)))
+    cases = []
+    for problem in problems:
+        nlp = transcribe_onto(problem, path, units_of(problem, path))
+        cases.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
+    for turn in taken:
+        for i, (assembly, x, p, multipliers) in enumerate(cases):
+            begun = time.perf_counter()
+            assembly.jacobian(x, p)
+            assembly.hessian(x, p, 1.0, multipliers)
+            turn[i] = time.perf_counter() - begun
+    return taken.min(axis=0)

@@ -1,0 +1,143 @@
+"""What rounding does to a march of many steps, and what steps beyond the limit of stability do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import number
+from dmoc.effects.gravity import PointGravity, Spring
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.march import simulate
+from dmoc.scene.ends import State
+from dmoc.scene.problem import TransferProblem
+from dmoc.studies.drift import step_function
+
+# Of the circular orbit that rounding is measured on: its radius, rate and mu are 1.
+PER_REVOLUTION = 1000
+FORMS = ("two-step form", "displacements", "compensated")
+METHODS = ("order 2", "order 4", "order 6", "order 8", "RK4", "DOP853")
+# The one-step matrices are looked at for h omega up to this, so close that no gap is missed: the first
+# one of order 8 is 1e-3 wide.
+REACH = np.arange(1, 20_001) * 4e-4
+# Eigenvalues that meet on the unit circle are known to the root of rounding only.
+GROWS = 1 + 1e-6
+
+
+@dataclass(frozen=True)
+class RoundOff:
+    """One way to march equation (16) along a circular orbit, where all errors are those of rounding.
+
+    Attributes
+    ----------
+    form : str
+    steps : array, shape (count,)
+    momentum_error : array, shape (count,)
+        Largest relative error of the angular momentum in so many steps [-].
+    miss : float
+        Distance from the compensated march at the end, in radii [-].
+    """
+
+    form: str
+    steps: np.ndarray = field(repr=False)
+    momentum_error: np.ndarray = field(repr=False)
+    miss: float
+
+
+@dataclass(frozen=True)
+class Growth:
+    """By how much one step of a method enlarges an oscillation at most.
+
+    Attributes
+    ----------
+    method : str
+    reach : array, shape (count,)
+        h omega, the step times the rate of the oscillator [-].
+    growth : array, shape (count,)
+        Spectral radius of the one-step matrix: 1 is stable, less loses energy [-].
+    """
+
+    method: str
+    reach: np.ndarray = field(repr=False)
+    growth: np.ndarray = field(repr=False)
+
+    @property
+    def gaps(self) -> list[tuple[float, float, float]]:
+        """Where it is unstable: from h omega, to h omega, largest growth a step."""
+        grows = np.concatenate([[False], self.growth > GROWS, [False]])
+        edges = np.flatnonzero(np.diff(grows))
+        return [
+            (float(self.reach[a]), float(self.reach[b - 1]), float(self.growth[a:b].max()))
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
+        ]
+
+
+def round_off(steps: int = 1_000_000) -> list[RoundOff]:
+    """March a circular orbit by the three forms of equation (16), 1,000 steps a revolution.
+
+    The two-step form is x_{k+1} = 2 x_k - x_{k-1} + h^2 a_k, as the equation suggests; dmoc adds
+    displacements to positions and impulses to momenta, if asked with Kahan's compensated sums.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 1,000 steps.
+    """
+    if number("steps", steps, "-") != int(steps) or steps < PER_REVOLUTION:
+        raise ValueError(f"steps must be a whole number of at least {PER_REVOLUTION}; got {steps:g}")
+    here = State((1, 0), (0, 1))
+    duration = 2 * np.pi * steps / PER_REVOLUTION
+    case = TransferProblem(1.0, here, here, duration, effects=(PointGravity(1.0),))
+    plain, exact = (simulate(case, steps=steps, compensated=flag) for flag in (False, True))
+    at = np.unique(np.geomspace(10, steps, 200).astype(int))
+    paths = {
+        FORMS[0]: two_step(steps),
+        **{
+            form: (found.position, _spin(found.position, found.momentum))
+            for form, found in zip(FORMS[1:], (plain, exact), strict=True)
+        },
+    }
+    return [
+        RoundOff(
+            form,
+            at,
+            np.maximum.accumulate(np.abs(spin / spin[0] - 1))[at - 1],
+            float(np.linalg.norm(places[-1] - exact.position[-1])),
+        )
+        for form, (places, spin) in paths.items()
+    ]
+
+
+def two_step(steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """The two-step form from (1, 0): places, shape (steps+1, 2), and angular momenta of the steps, (steps,)."""
+    h, pair = 2 * np.pi / PER_REVOLUTION, ca.SX.sym("pair", 4)
+    before, here = pair[:2], pair[2:]
+    pull = -here / (ca.sqrt(ca.dot(here, here)) * ca.dot(here, here))
+    step = ca.Function("step", [pair], [ca.vertcat(here, 2 * here - before + h**2 * pull)])
+    start = np.array([1.0, 0.0])
+    first = np.concatenate([start, start + h * np.array([0.0, 1.0]) - 0.5 * h**2 * start])
+    marched = step.mapaccum("march", steps - 1, {"base": 4})(first).full().T
+    places = np.vstack([start, first[2:], marched[:, 2:]])
+    return places, _spin(places[:-1], np.diff(places, axis=0)) / h
+
+
+def _spin(place: np.ndarray, push: np.ndarray) -> np.ndarray:
+    return place[:, 0] * push[:, 1] - place[:, 1] * push[:, 0]
+
+
+def growth() -> list[Growth]:
+    """Growth of one step of several methods on x'' = -omega^2 x, for many values of h omega."""
+    here = State((1,), (0,))
+    case = TransferProblem(1.0, here, here, 1.0, effects=(Spring(1.0, (0.0,)),))
+    dynamics, rows = Dynamics(1, case.effects), []
+    for name in METHODS:
+        step = step_function(name, dynamics, case).map(len(REACH))
+        columns = [
+            step(np.tile(begin[:, None], len(REACH)), np.zeros((1, len(REACH))), REACH[None]).full()
+            for begin in np.eye(2)
+        ]
+        rates = np.abs(np.linalg.eigvals(np.stack(columns, axis=1).T))
+        rows.append(Growth(name, REACH, rates.max(axis=1)))
+    return rows

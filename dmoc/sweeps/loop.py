@@ -1,0 +1,137 @@
+"""Points to workers and records to the journal, wave after wave."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from dataclasses import dataclass, field
+from typing import Any
+
+from dmoc.sweeps.journal import Journal
+from dmoc.sweeps.plan import Plan
+from dmoc.sweeps.pool import Pool
+from dmoc.sweeps.retry import DIED, MOST_LOOKS, better, doubtful, next_to
+from dmoc.sweeps.worker import Task, failure
+
+Progress = Callable[[int, int, int], Any]
+
+
+@dataclass
+class Sweep:
+    """One sweep under way.
+
+    Which points a wave has follows from the records of the waves before it alone, never from the
+    order in which points end: so a sweep that was stopped ends with the same numbers.
+
+    Attributes
+    ----------
+    task : callable
+        What a worker is told, from the number of a point, the path to start from, and whether it is
+        a second look.
+    progress : callable or None
+        Called with (solves made, solves in all as far as known, points not solved so far).
+    best : dict
+        The record that counts of each point, and the wave it comes from.
+    looks : Counter
+        How often each point was tried.
+    """
+
+    plan: Plan
+    journal: Journal
+    pool: Pool
+    task: Callable[[int, str | None, bool], Task]
+    progress: Progress | None = None
+    best: dict[int, tuple[int, dict[str, Any]]] = field(default_factory=dict)
+    looks: Counter[int] = field(default_factory=Counter)
+    tries: int = 0
+    unsolved: int = 0
+
+    def run(self, follow: bool) -> list[dict[str, Any]]:
+        """All records, in the order of the points."""
+        self._wave(0, {point: self.plan.before(point) if follow else None for point in range(self.plan.size)})
+        wave, again = 1, doubtful(self.plan, self._records(), follow)
+        while again:
+            before = {point: self.best[point] for point in again}
+            self._wave(wave, again)
+            changed = {point: old for point, (at, old) in before.items() if self.best[point][0] != at}
+            again = next_to(self.plan, self._records(), changed, again)
+            again = {point: parent for point, parent in again.items() if self.looks[point] < MOST_LOOKS}
+            wave += 1
+        return self._records()
+
+    def _records(self) -> list[dict[str, Any]]:
+        return [self.best[point][1] for point in range(self.plan.size)]
+
+    def _wave(self, wave: int, parents: Mapping[int, int | None]) -> None:
+        """Try points, each from its parent's answer where that was solved."""
+        ready, children = self._sorted_out(wave, parents)
+        left = len(ready) + sum(map(len, children.values()))
+        running: dict[Future, int] = {}
+        suspects: deque[int] = deque()
+        while left:
+            alone = bool(suspects) and not running
+            if alone:
+                self._begin(wave, suspects[0], parents, running)
+            while ready and not suspects and len(running) < self.pool.width():
+                self._begin(wave, ready.popleft(), parents, running)
+            self._tell(left)
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                point, outcome = running.pop(future), self._outcome(future)
+                if outcome is None and not alone:
+                    # any of the points that were under way may have brought the worker down
+                    suspects.append(point)
+                    continue
+                if alone:
+                    suspects.popleft()
+                outcome = outcome or (failure(DIED, "its worker process ended, twice"), None)
+                self.journal.append(wave, point, *outcome)
+                self._settle(wave, point)
+                ready.extend(children.pop(point, ()))
+                left -= 1
+        self._tell(left)
+
+    def _tell(self, left: int) -> None:
+        if self.progress is not None:
+            self.progress(self.tries, self.tries + left, self.unsolved)
+
+    def _sorted_out(self, wave: int, parents: Mapping[int, int | None]) -> tuple[deque, dict[int, list[int]]]:
+        """The points that can be begun, and those that wait for a parent; the journal may have some already."""
+        ready: deque[int] = deque()
+        children: dict[int, list[int]] = {}
+        for point, parent in parents.items():
+            if (wave, point) in self.journal.records:
+                self._settle(wave, point)
+            elif parent is None or parent in self.best:
+                ready.append(point)
+            else:
+                children.setdefault(parent, []).append(point)
+        return ready, children
+
+    def _begin(
+        self, wave: int, point: int, parents: Mapping[int, int | None], running: dict[Future, int]
+    ) -> None:
+        start, parent = None, parents[point]
+        if parent is not None and self.best[parent][1].get("success"):
+            start = self.journal.path_at(self.best[parent][0], parent)
+        running[self.pool.submit(self.task(point, start, wave > 0))] = point
+
+    def _outcome(self, future: Future) -> tuple[dict[str, Any], str | None] | None:
+        """What a worker brought back, or None if it ended before."""
+        try:
+            return future.result()
+        except self.pool.deaths:
+            return None
+        except CancelledError:
+            raise OSError("the scheduler was lost; the journal is kept: run the same sweep again") from None
+
+    def _settle(self, wave: int, point: int) -> None:
+        """Let a record count if it is the first of its point, or better."""
+        record = self.journal.records[wave, point]
+        self.looks[point] += 1
+        self.tries += 1
+        known = self.best.get(point)
+        if known is None or better(record, known[1]):
+            was = 0 if known is None else not known[1].get("success")
+            self.unsolved += (not record.get("success")) - was
+            self.best[point] = wave, record

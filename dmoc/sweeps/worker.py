@@ -1,0 +1,188 @@
+"""One point of a sweep, solved in a process of its own.
+
+A worker is told where the problem file is and what to make of it, and reads it itself. What comes
+back is plain: a record of numbers and texts, and the path as text, so that a journal can hold both.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import threading
+import time
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from dmoc.scene.problem_file import ProblemFile, load_problem
+
+if TYPE_CHECKING:
+    from dmoc.checks.verification import Report
+    from dmoc.motion.mesh import Guess
+    from dmoc.results.solution import Solution
+    from dmoc.scene.problem import TransferProblem
+
+MULTIPLIER = "multiplier "
+# A scheduler may give its workers several threads; one process solves one point at a time all the same.
+_TURN = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker has to know of one point.
+
+    Attributes
+    ----------
+    path, source_hash : str
+        The problem file, and what it was when the sweep began.
+    values : dict
+        Its parameters.
+    numerics : dict
+        order, steps, tol and hold of `solve`.
+    start : str or None
+        The path of a neighbour, from `pack`.
+    again : bool
+        Whether the problem's own guess has failed already.
+    """
+
+    path: str
+    source_hash: str
+    values: dict[str, Any]
+    numerics: dict[str, Any]
+    start: str | None = None
+    again: bool = False
+
+
+def solve_point(task: Task) -> tuple[dict[str, Any], str | None]:
+    """Record and path of a point; a failure is a record too.
+
+    Raises
+    ------
+    ValueError
+        If the problem file is not the one the sweep began with: then no point is worth solving.
+    """
+    with _TURN, redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        file = _problem_file(task.path, task.source_hash)
+        try:
+            problem = file.make(**task.values)
+            solution, warm = _solve(problem, task)
+            return _record(solution, warm), pack(solution.path) if solution.success else None
+        except ValueError as error:
+            return failure("refused", error), None
+        except Exception as error:  # a user's own effect can raise anything
+            return failure("error", f"{type(error).__name__}: {error}"), None
+
+
+def failure(status: str, message: Any) -> dict[str, Any]:
+    """The record of a point that came to no iterate."""
+    return {"status": status, "message": " ".join(str(message).split())}
+
+
+def pack(path: Guess) -> str:
+    """A path as text, exact to the last bit."""
+    import numpy as np
+
+    arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
+    arrays |= {name: getattr(path, name) for name in ("start_velocity", "goal_velocity")}
+    arrays |= {MULTIPLIER + name: values for name, values in path.multipliers.items()}
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer, order=path.order, hold=path.hold, duration=path.duration, allow_pickle=False, **arrays
+    )
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def unpack(text: str) -> Guess:
+    """The path that `pack` wrote."""
+    import numpy as np
+
+    from dmoc.motion.mesh import Guess
+
+    with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as held:
+        arrays = dict(held)
+    multipliers = {
+        name.removeprefix(MULTIPLIER): arrays.pop(name) for name in list(arrays) if name.startswith(MULTIPLIER)
+    }
+    order, hold, duration = (arrays.pop(name).item() for name in ("order", "hold", "duration"))
+    return Guess(order=order, hold=hold, duration=duration, multipliers=multipliers, **arrays)
+
+
+@lru_cache(maxsize=4)
+def _problem_file(path: str, source_hash: str) -> ProblemFile:
+    file = load_problem(path)
+    if file.source_hash != source_hash:
+        raise ValueError(f"{path} has changed since the sweep began; begin again with --restart")
+    return file
+
+
+def _solve(problem: TransferProblem, task: Task) -> tuple[Solution, bool]:
+    """From the neighbour if there is one, else, or if that fails, from the problem's own guess."""
+    from dmoc.solver.solve import solve
+
+    if task.start is not None:
+        solution = solve(problem, guess=unpack(task.start), **task.numerics)
+        if solution.success or task.again:
+            return solution, True
+    return solve(problem, **task.numerics), False
+
+
+def _record(solution: Solution, warm: bool) -> dict[str, Any]:
+    """What is kept of a solution; figures of a failed one mean nothing and are left out."""
+    from dmoc.checks.verification import verify
+
+    problem = solution.require_problem()
+    record: dict[str, Any] = {
+        "status": solution.status,
+        "message": "" if solution.success else solution.message,
+        "from_neighbour": warm,
+        "order": solution.order,
+        "steps": solution.steps,
+        "iterations": solution.iterations,
+        "build_s": solution.build_s,
+        "solve_s": solution.solve_s,
+    }
+    if not solution.success:
+        return record
+    begun = time.perf_counter()
+    verdict = verify(solution)
+    return record | {
+        "success": True,
+        "objective": solution.objective,
+        "objective_name": problem.objective.label,
+        "objective_unit": solution.provenance.objective_unit,
+        "objective_sense": problem.objective.sense,
+        "duration": solution.duration,
+        "final_mass": solution.final_mass,
+        "propellant": problem.mass - solution.final_mass,
+        **_efforts(solution),
+        **_worst(verdict),
+        "verify_s": time.perf_counter() - begun,
+    }
+
+
+def _efforts(solution: Solution) -> dict[str, float]:
+    """Effort [N^2 s] and impulse [N s] of the force, with the scheme's own weights."""
+    import numpy as np
+
+    from dmoc.motion.lobatto import scheme
+    from dmoc.motion.mesh import node_weights
+
+    path = solution.path
+    weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
+    size = np.linalg.norm(solution.force, axis=1)
+    return {
+        "effort": float(0.5 * path.duration * weights @ size**2),
+        "impulse": float(path.duration * weights @ size),
+    }
+
+
+def _worst(verdict: Report) -> dict[str, Any]:
+    """The failed check that is furthest beyond its limit, and how many times beyond."""
+    failed = {
+        check.name: check.value / check.limit if check.value is not None and check.limit else float("inf")
+        for check in verdict.checks
+        if not check.ok
+    }
+    worst = max(failed, key=lambda name: failed[name], default="")
+    return {"checks_hold": verdict.ok, "failed_check": worst, "failed_by": failed.get(worst)}

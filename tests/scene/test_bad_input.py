@@ -1,0 +1,470 @@
+"""Whatever is given, to whatever takes it: used, or refused in one line that says what it should be.
+
+Pass criterion: no exception but ValueError, its message one line; on the command line no traceback, exit
+code 2 with one line on stderr and nothing on stdout, and nothing written.
+"""
+
+import contextlib
+import decimal
+import io
+import math
+import shutil
+import warnings
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import dmoc
+from dmoc import (
+    Actuator,
+    Atmosphere,
+    BallForce,
+    Boundary,
+    Constraint,
+    Drag,
+    Effect,
+    Effort,
+    FreeForce,
+    KeepOut,
+    LinearDrag,
+    Objective,
+    PointGravity,
+    RadiationPressure,
+    Shadow,
+    State,
+    ThirdBody,
+    Time,
+    TransferProblem,
+    UniformAtmosphere,
+    Wind,
+    simulate,
+    solve,
+    transcribe,
+    verify,
+)
+from dmoc.cli.app import main
+from dmoc.plots.page import save_figure
+from dmoc.studies.drift import kepler
+
+
+def scene(**parts):
+    return dict(mass=1.0, start=State((0, 0), (0, 0)), goal=State((4, 0), (0, 0)), duration=4.0) | parts
+
+
+HERE = TransferProblem(**scene())
+ELLIPSE = {"mu": 1.0, "a": 9.0, "e": 0.1, "i": 0.0, "node": 0.0, "argument": 0.0, "mean_anomaly": 0.0}
+# arguments that are good, one of which is then replaced
+MAKES = {
+    "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6},
+    "BallForce": {"limit": 2.0},
+    "BoxForce": {"limit": 2.0},
+    "CircularOrbit": {"radius": 2.0, "mu": 1.0, "center": (0, 0), "normal": None, "clockwise": False},
+    "ClohessyWiltshire": {"mean_motion": 0.1},
+    "Condition": {
+        "function": lambda t, q, v, m: q[0] - 4,
+        "name": "there",
+        "scale": 1.0,
+        "state": State((None, 0), (0, 0)),
+    },
+    "ConicalShadow": {"radius": 1.0, "sun_radius": 7e8},
+    "CylindricalShadow": {"radius": 1.0, "sharpness": 10.0},
+    "Drag": {"area": 1.0, "drag_coefficient": 1.0, "atmosphere": UniformAtmosphere(1.0)},
+    "Engine": {
+        "max_thrust": 2.0,
+        "specific_impulse": 300.0,
+        "dry_mass": 0.1,
+        "min_thrust": 0.0,
+        "box": 1.0,
+        "smoothing": 1e-5,
+    },
+    "ExponentialAtmosphere": {
+        "density": 1.0,
+        "height": 0.0,
+        "scale_height": 1.0,
+        "radius": 3.0,
+        "rate": 0.1,
+        "wind": None,
+    },
+    "FinalHeight": {"axis": 1},
+    "FinalRadius": {"center": (0, 0)},
+    "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
+    "KeepIn": {"lower": (-9, -9), "upper": (9, 9)},
+    "KeepOut": {"center": (2, 2), "radius": 0.5},
+    "LinearDrag": {"coefficient": 0.1, "wind": None},
+    "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched"},
+    "Nozzles": {
+        "directions": ((1, 0), (-1, 0), (0, 1), (0, -1)),
+        "max_thrust": 2.0,
+        "exhaust_velocity": 100.0,
+        "dry_mass": 0.1,
+    },
+    "Orbit": dict.fromkeys(("i", "raan", "argp", "nu")) | {"mu": 1.0, "a": 2.0, "e": 0.1, "center": (0, 0)},
+    "PointGravity": {"mu": 1.0, "center": (0, 9)},
+    "RadiationPressure": {"area": 1.0, "reflectivity": 0.5, "sun": (1.5e11, 0), "shadow": None},
+    "RotatingFrame": {"rate": 0.1},
+    "SpeedLimit": {"limit": 9.0},
+    "Spring": {"stiffness": 1.0, "anchor": (0, 0)},
+    "State": {"position": (0, 0), "velocity": (0, 0)},
+    "ThirdBody": {"mu": 1.0, "position": (9, 9)},
+    "TransferProblem": scene(
+        effects=(), actuator=FreeForce(), objective=Effort(), constraints=(), guess=None, start_time=0.0
+    ),
+    "UniformAtmosphere": {"density": 1.0, "wind": (0, 1)},
+    "UniformGravity": {"acceleration": (0, -1)},
+    "WeightedSum": {"parts": ((1.0, Effort()), (2.0, Time()))},
+    "Wind": {"field": (0, 1)},
+    "circular_motion": {"radius": 9.0, "rate": 0.1, "phase": 0.0, "inclination": 0.0},
+    "kepler_motion": ELLIPSE,
+    "tabulated_motion": {"times": (0, 1, 2, 3), "positions": ((9, 0), (9, 1), (9, 2), (9, 3))},
+    "three_body": {"mass_ratio": 0.1},
+}
+
+
+def fails(*given):
+    raise RuntimeError("of its own")
+
+
+ODD = [
+    *(
+        True,
+        10**400,
+        2**63,
+        -0.0,
+        1e308,
+        1e-308,
+        1j,
+        b"1",
+        "1.0",
+        "matched",
+        "abc" * 1000,
+        decimal.Decimal("2.5"),
+    ),
+    *(
+        (),
+        {},
+        set(),
+        range(2),
+        slice(1, 2),
+        Ellipsis,
+        object(),
+        object,
+        math,
+        print,
+        np.float32(1),
+        np.int64(3),
+    ),
+    *(np.array(1.0), np.array([1.0, 2.0]), np.array([[1.0, 2.0]]), np.ones((2, 2, 2)), np.array(["a"])),
+    *(np.zeros(0), np.zeros((2, 0)), np.ones(10**5), np.array([1, None]), ((1, 2), (3,)), [[[[1]]]]),
+    *(ca.SX.sym("z"), ca.MX.sym("z"), ca.DM([1, 2]), ca.SX.sym("z", 2), ca.SX(1)),
+    *(fails, lambda: 1, lambda *a: None, lambda *a: "x", lambda *a: (), lambda *a: [1, 2, 3, 4]),
+    *(lambda *a: math.nan, lambda t, *a: math.cos(t), lambda *a: (1.0, 2.0)),
+    *(Effort(), Effort, Time(), HERE, HERE.start, KeepOut((2, 2), 0.5), [KeepOut((2, 2), 0.5), 3]),
+    *(
+        BallForce(1.0),
+        BallForce,
+        PointGravity(1.0),
+        [PointGravity(1.0)],
+        [("a", Effort())],
+        [(math.nan, Effort())],
+    ),
+    *((1, 4), (4, 1), (0, 4), (4, 4), (1, math.inf), (math.nan, 0), (None, None), (1e200, 1e200), (1e-200, 0)),
+]
+# by number: Hypothesis writes out what it picks from
+PICKED = st.integers(0, len(ODD) - 1).map(lambda i: ODD[i])
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4) | PICKED
+ANYTHING = st.recursive(
+    SCALARS, lambda inner: st.lists(inner, max_size=4) | st.lists(inner, max_size=4).map(tuple), max_leaves=6
+)
+QUICK = settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+THOROUGH = settings(QUICK, max_examples=2000, derandomize=False)
+
+
+def answered(call):
+    """What a call gives, or None where it refuses in one line; any other exception is a failure."""
+    # what a function in ODD prints is of no interest
+    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+        warnings.simplefilter("error")
+        try:
+            return call()
+        except ValueError as error:
+            text = str(error)
+            assert text.strip() and "\n" not in text and len(text) < 500, text
+            return None
+
+
+def put_to_use(part):
+    """A problem with this part in it."""
+    if isinstance(part, TransferProblem):
+        return part
+    if isinstance(part, tuple):
+        return TransferProblem(1.0, State((0, 0, 0), (0, 0, 0)), State((4, 0, 0), (0, 0, 0)), 4.0, part)
+    if isinstance(part, Atmosphere):
+        part = Drag(1.0, 1.0, part)
+    elif isinstance(part, Wind):
+        part = LinearDrag(1.0, part)
+    elif isinstance(part, Shadow):
+        part = RadiationPressure(1.0, 0.5, (1.5e11, 0), part)
+    kinds = {Boundary: "goal", Actuator: "actuator", Effect: "effects", Objective: "objective"}
+    name = next((name for kind, name in kinds.items() if isinstance(part, kind)), "")
+    if name == "effects":
+        return TransferProblem(**scene(effects=[part]))
+    if name == "objective":
+        return TransferProblem(**scene(objective=part, actuator=BallForce(3.0), duration=(1.0, 9.0)))
+    if name:
+        return TransferProblem(**scene(**{name: part}))
+    if isinstance(part, Constraint):
+        return TransferProblem(**scene(constraints=[part]))
+    return TransferProblem(**scene(effects=[ThirdBody(1.0, part)]))
+
+
+def try_making(name, argument, value):
+    part = answered(lambda: getattr(dmoc, name)(**(MAKES[name] | {argument: value})))
+    problem = None if part is None else answered(lambda: put_to_use(part))
+    if problem is not None:
+        assert all(effect.words() for effect in problem.effects) and problem.goal.words()
+        answered(lambda: transcribe(problem, 4))
+
+
+def test_every_constructor_is_tried():
+    made = {name for name in dmoc.__all__ if name[0].isupper() or name in ("three_body",)}
+    made |= {name for name in dmoc.__all__ if name.endswith("_motion")}
+    abstract = {
+        "Actuator",
+        "Atmosphere",
+        "Boundary",
+        "Conservative",
+        "Constraint",
+        "Effect",
+        "Force",
+        "Objective",
+    }
+    without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}
+    results = {"Formulation", "NLP", "Report", "Row", "Solution", "SolveError", "Trajectory"}
+    assert made - abstract - without_arguments - results == set(MAKES)
+
+
+@pytest.mark.parametrize("name", MAKES)
+def test_constructors_and_odd_values(name):
+    for argument in MAKES[name]:
+        for value in ODD:
+            try_making(name, argument, value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MAKES)
+@THOROUGH
+@given(data=st.data())
+def test_constructors_and_any_value_at_length(name, data):
+    try_making(name, data.draw(st.sampled_from(list(MAKES[name]))), data.draw(ANYTHING))
+
+
+@pytest.mark.parametrize("name", MAKES)
+@QUICK
+@given(data=st.data())
+def test_constructors_and_any_value(name, data):
+    try_making(name, data.draw(st.sampled_from(list(MAKES[name]))), data.draw(ANYTHING))
+
+
+# Solutions of 4 steps are quick, whatever else is asked for.
+CALLS = {
+    "drift": (
+        dmoc.drift,
+        {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
+    ),
+    "load": (dmoc.load, {"path": "nothing.nc"}),
+    "save_figure": (save_figure, {"path": "x.svg"}),
+    "simulate": (
+        simulate,
+        {
+            "problem": HERE,
+            "controls": None,
+            "steps": 4,
+            "order": 2,
+            "hold": False,
+            "duration": 4.0,
+            "compensated": False,
+        },
+    ),
+    "solve": (
+        solve,
+        {
+            "problem": HERE,
+            "order": 2,
+            "steps": 4,
+            "hold": False,
+            "mesh": None,
+            "guess": None,
+            "options": {"ipopt.max_iter": 9},
+            "progress": None,
+        },
+    ),
+    "solve to a tolerance": (solve, {"problem": HERE, "tol": 1e-2, "order": 4, "steps": 4}),
+    "transcribe": (transcribe, {"problem": HERE, "steps": 4, "order": 2, "mesh": None, "guess": None}),
+    "verify": (verify, {"problem": HERE}),
+}
+# None means "not given"; what such a function raises in the middle of a solve is what solve raises
+LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_functions_and_odd_values(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    function, good = CALLS[name]
+    if name in ("verify", "save_figure"):
+        good = good | {"solution": solve(HERE, steps=4)}
+    for argument in good:
+        for value in ODD:
+            if not LEFT_OUT.get((name, argument), lambda value: False)(value):
+                answered(lambda value=value, argument=argument: function(**(good | {argument: value})))
+    # text names a file, and nothing else does
+    assert {path.name for path in tmp_path.iterdir()} <= {"x.svg"}
+
+
+# The verbs, with arguments that are good, and the options each takes; the problem is solved in a moment.
+STEPS = ["--steps", "4"]
+VERBS = {
+    "solve": (
+        ["point_to_point", *STEPS],
+        ["--order", "--steps", "--tol", "--set", "--out", "--plot", "--guess"],
+    ),
+    "show": (["point_to_point"], ["--set"]),
+    "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls"]),
+    "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
+    "check": (["nothing.nc"], ["--problem"]),
+    "plot": (["nothing.nc"], ["--out", "--problem"]),
+    "export": (["point_to_point", "out", *STEPS, "--no-c"], ["--order", "--steps", "--set"]),
+    "stability": (["--revolutions", "1", "--steps", "1000"], ["--revolutions", "--eccentricity", "--plot"]),
+    "study": (
+        ["rendezvous", "--orders", "8", "--steps", "8", "--repeats", "1"],
+        ["--orders", "--steps", "--against", "--repeats", "--reference", "--set", "--plot", "--csv"],
+    ),
+    "sweep": (
+        ["point_to_point", "--vary", "duration=4:5:2", "--out", "no/such.nc"],
+        ["--vary", "--sample", "--seed", "--order", "--steps", "--tol", "--set", "--out", "--workers"],
+    ),
+}
+WRONG = [
+    *(
+        "",
+        " ",
+        "x",
+        "nan",
+        "inf",
+        "-inf",
+        "-1",
+        "0",
+        "-0.0",
+        "1e400",
+        "1e-400",
+        "9" * 30,
+        "1.5",
+        "True",
+        "None",
+    ),
+    *(
+        "(",
+        "(1,",
+        "[]",
+        "{}",
+        "1,2",
+        ",",
+        "=",
+        "a=",
+        "=1",
+        "a=b=c",
+        "mass=nan",
+        "mass=1e400",
+        "mass=-1",
+        "mass=''",
+    ),
+    *(
+        "goal=(1,)",
+        "goal=()",
+        "goal=(1,2,3,4)",
+        "goal=('a','b')",
+        "goal=(1e300,0)",
+        "duration=None",
+        "duration=(4,1)",
+    ),
+    *(
+        "mass=__import__('os')",
+        "mass=" + "(" * 200,
+        "\u00e9",
+        "\u2028",
+        "a\nb",
+        "--",
+        "-",
+        "/",
+        ".",
+        "..",
+        "~",
+        "a" * 300,
+    ),
+    *(
+        "no/such/file.nc",
+        "x.gif",
+        "/dev/null",
+        "pyproject.toml",
+        "duration=1:2:0",
+        "duration=1:2:x",
+        "duration=2:1:-3",
+    ),
+]
+
+
+def command_line(capfd, arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capfd.readouterr()
+    return end.value.code or 0, out, err
+
+
+def try_command(capfd, folder, verb, option, text):
+    good, _ = VERBS[verb]
+    code, out, err = command_line(capfd, [verb, *good, option, text])
+    words = f"dmoc {verb} {option} {text!r} exits with {code}: {err}"
+    assert code in (0, 2, 3, 4) and "Traceback" not in err, words
+    if code == 2:
+        assert out == "" and err.startswith("error: ") and err.count("\n") == 1 and len(err) < 600, words
+        assert [path.name for path in folder.iterdir()] == [], words
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path / "here"
+
+
+OPTIONS = [(verb, option) for verb, (_, options) in VERBS.items() for option in options]
+# where a file is written every other text is a good name
+NO_FILES = ["", " ", ".", "..", "/", "a" * 300, "no/such/file.nc", "x.gif", "/dev/null"]
+SHARES = [4, pytest.param(1, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize(("verb", "option"), OPTIONS)
+def test_options_and_odd_texts(capfd, empty, verb, option, share):
+    texts = NO_FILES if option in ("--out", "--plot", "--csv") else WRONG
+    for text in texts[OPTIONS.index((verb, option)) % share :: share]:
+        try_command(capfd, empty, verb, option, text)
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("verb", VERBS)
+def test_arguments_and_odd_texts(capfd, empty, verb, share):
+    texts = [text for text in WRONG if text != "--"]
+    for text in texts[len(verb) % share :: share]:
+        code, out, err = command_line(capfd, [verb, text])
+        assert (code, out, err.count("\n")) == (2, "", 1), f"dmoc {verb} {text!r}: {code} {err}"
+        assert "Traceback" not in err and not list(empty.iterdir())

@@ -1,0 +1,97 @@
+"""An accuracy that is asked for is met, on few steps, and the estimate of the error is the error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmoc import solve, verify
+from dmoc.scene.problem_file import load_problem
+from dmoc.solver.tolerance import rounding_cost, switch_times
+
+# Problem, tolerance, optimum, most steps that this may take (a few times what it takes), order.
+KNOWN = [
+    ("bang_bang", 1e-6, 2.0, 100, 4),
+    ("lunar_landing", 1e-6, 8.246211251, 200, 4),
+    ("drone_hop", 1e-6, 211.4604947, 200, 4),
+    ("earth_mars", 1e-6, 3.31922028, 200, 4),
+    ("two_body_fuel", 1e-4, 0.0767810993, 200, 4),
+    ("two_body_fuel", 1e-5, 0.0767810993, 400, 4),
+    ("goddard", 1e-4, 1.012836918, 800, 2),
+    ("orbit_raise", 1e-8, 1.6903228945e-3, 60, 8),
+    ("rendezvous", 1e-8, 1.048842323e-3, 40, 8),
+]
+
+
+def asked(name, tol, **numerics):
+    return solve(load_problem(name).make(), tol=tol, **numerics).raise_for_status()
+
+
+@pytest.mark.parametrize(("name", "tol", "exact", "most", "order"), KNOWN)
+def test_a_tolerance_is_met_on_few_steps(name, tol, exact, most, order):
+    found = asked(name, tol)
+    assert verify(found).ok and found.order == order and found.steps <= most, found.reason
+    assert found.error.largest <= tol
+    # the optima are known to ten digits
+    assert abs(found.objective / exact - 1) <= max(found.error.largest, 1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_tolerance_may_begin_with_two_held_steps():
+    found = asked("bang_bang", 1e-2, steps=2, hold=True)
+    assert verify(found).ok and found.objective == pytest.approx(2.0, rel=1e-2)
+
+
+def test_contacts_with_zones_take_local_steps_and_their_error_is_foreseen():
+    coarse, fine = asked("free_flyer", 1e-4), asked("free_flyer", 1e-5)
+    assert verify(fine).ok and fine.error.largest <= 1e-5 and fine.steps < 2500
+    assert abs(coarse.objective / fine.objective - 1) <= coarse.error.largest + fine.error.largest
+    ends = [np.column_stack([s.path.mesh, s.position[:: s.order // 2]]) for s in (coarse, fine)]
+    shared = np.isclose(ends[1][:, 0][:, None], ends[0][:, 0]).any(axis=1)
+    extent = np.linalg.norm(np.ptp(fine.position, axis=0))
+    apart = np.abs(ends[1][shared, 1:] - ends[0][:, 1:]).max() / extent
+    assert apart <= coarse.error.path + fine.error.path
+
+
+def test_all_step_ends_are_kept_from_mesh_to_mesh_and_gathered_at_the_switch():
+    coarse, fine = asked("lunar_landing", 1e-4), asked("lunar_landing", 1e-7)
+    assert np.isclose(fine.path.mesh, coarse.path.mesh[:, None]).any(axis=1).all()
+    (switch,) = switch_times(fine.problem, fine.path)
+    step = np.diff(fine.path.mesh)
+    at = np.searchsorted(fine.path.mesh * fine.duration, switch) - 1
+    assert step[at] < step.max() / 32
+    assert switch == pytest.approx(1.4154037504, rel=1e-3) and f"{switch:.5g}" in fine.reason
+
+
+def test_a_switch_is_found_where_the_closed_form_has_it():
+    found = asked("bang_bang", 1e-6)
+    assert switch_times(found.problem, found.path) == pytest.approx([1.0], abs=1e-4)
+
+
+def test_what_the_rounding_of_the_thrust_costs_is_foreseen():
+    case = load_problem("two_body_fuel").make()
+
+    def rounded(width):
+        return solve(replace(case, actuator=replace(case.actuator, smoothing=width)), order=4, steps=60)
+
+    wide, narrow = rounded(1e-5), rounded(1e-7)
+    costs = rounding_cost(wide.problem, wide.path) - rounding_cost(narrow.problem, narrow.path)
+    assert wide.objective - narrow.objective == pytest.approx(costs, rel=0.02)
+
+
+def test_an_accuracy_beyond_the_rounding_of_the_thrust_is_not_claimed():
+    case = load_problem("two_body_fuel").make()
+    coarse = replace(case, actuator=replace(case.actuator, smoothing=1e-3))
+    found = solve(coarse, tol=1e-4)
+    assert found.error.largest > 1e-4 and "rounding" in found.reason
+    assert abs(found.objective / 0.0767810993 - 1) <= found.error.largest
+
+
+def test_where_finer_meshes_do_no_better_the_best_one_is_the_answer():
+    """A billionth of a switching time is beyond rounding in steps: neither minutes nor a worse answer."""
+    found = solve(load_problem("lunar_landing").make(), tol=1e-9).raise_for_status()
+    errors = [level.error for level in found.ladder if level.error is not None]
+    assert found.error.largest == min(errors) > 1e-9
+    assert "finer meshes did no better" in found.reason
+    assert found.objective == pytest.approx(8.246211251, rel=3 * found.error.largest)
+    assert len(found.ladder) < 12 and verify(found).ok

@@ -1,0 +1,158 @@
+"""Imports flow one way, from folder to folder: each may import those before it, and nothing after."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import dmoc
+
+ROOT = Path(dmoc.__file__).parent
+
+# from the ground up; folders on one line do not know each other
+LAYERS = [
+    ["basics"],
+    ["effects"],
+    ["scene"],
+    ["motion"],
+    ["guess", "results"],
+    ["nlp"],
+    ["solver", "checks"],
+    ["studies", "sweeps", "exports"],
+    ["plots", "reports"],
+    ["cli"],
+]
+FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}
+FILES = [file for file in sorted(ROOT.rglob("*.py")) if file.parent != ROOT]
+
+
+def name_of(file):
+    """dmoc/effects/gravity.py: effects.gravity; dmoc/effects/__init__.py: effects."""
+    parts = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(file): file for file in FILES}
+
+
+def inside(module, names):
+    """Modules of dmoc that `from module import names` reaches, through the package's own table too."""
+    module = module.removeprefix("dmoc").removeprefix(".")
+    found = set()
+    for name in names:
+        longer = f"{module}.{name}".removeprefix(".")
+        if longer in MODULES:
+            found.add(longer)
+        elif module:
+            found.add(module)
+        elif name in dmoc._HOME_OF:
+            found.add(dmoc._HOME_OF[name].removeprefix("dmoc."))
+    return found
+
+
+def imported(source):
+    """Modules of dmoc that a source imports anywhere, inside functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {
+                alias.name.removeprefix("dmoc.") for alias in node.names if alias.name.startswith("dmoc.")
+            }
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "write dmoc.folder.name: a relative import hides where it comes from"
+            if node.module.split(".")[0] == "dmoc":
+                found |= inside(node.module, [alias.name for alias in node.names])
+    return found
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_folder_imports_only_folders_below_it(module):
+    own = module.split(".")[0]
+    assert own in FLOOR, f"give dmoc/{own} its place in LAYERS"
+    for other in imported(MODULES[module].read_text()):
+        home = other.split(".")[0]
+        assert home == own or FLOOR[home] < FLOOR[own], f"{module} imports dmoc.{other}, against the flow"
+
+
+def test_no_files_import_each_other_in_a_circle():
+    """Taking away files that import nothing else of what is left, nothing is left."""
+    left = {
+        module: imported(file.read_text()) - ({module} if file.name == "__init__.py" else set())
+        for module, file in MODULES.items()
+    }
+    while leaves := [module for module, needs in left.items() if not needs & left.keys()]:
+        for module in leaves:
+            del left[module]
+    assert not left, f"these import each other in a circle: {sorted(left)}"
+
+
+@pytest.mark.parametrize(
+    "source, found",
+    [
+        ("from dmoc.solver.solve import solve", {"solver.solve"}),
+        ("import dmoc.solver.solve as s", {"solver.solve"}),
+        ("from dmoc import solve", {"solver.solve"}),
+        ("from dmoc import solver", {"solver"}),
+        ("def f():\n    from dmoc.effects import gravity, Spring", {"effects.gravity", "effects"}),
+        ("import numpy\nfrom dmoc import __version__", set()),
+    ],
+)
+def test_every_way_to_import_is_seen(source, found):
+    assert imported(source) == found
+
+
+def test_the_front_loads_nothing_heavy():
+    """`dmoc --help` answers before CasADi, SciPy, matplotlib and xarray are loaded."""
+    script = (
+        "import sys, dmoc, dmoc.cli.app, dmoc.scene.problem_file, dmoc.reports.words\n"
+        "print(*sorted({'casadi', 'scipy', 'matplotlib', 'xarray'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
+
+
+@pytest.mark.parametrize(
+    "arguments, unused",
+    [
+        # force-free, coasts, a spiral to an orbit, an orbit that winds, three bodies
+        ("free_flyer", HEAVY),
+        ("two_body_fuel", HEAVY),
+        ("leo_raise --order 4", HEAVY),
+        ("dionysus --json", [*HEAVY, "rich.console"]),
+        ("halo_transfer --json", [*HEAVY, "rich.console"]),
+    ],
+)
+def test_a_solve_loads_what_it_uses(arguments, unused):
+    """SciPy alone takes longer to load than a small problem to solve."""
+    script = (
+        "import atexit, sys\nfrom dmoc.cli.app import main\n"
+        f"atexit.register(lambda: print(*sorted(set({unused}) & sys.modules.keys()), file=sys.stderr))\n"
+        f"main({['solve', *arguments.split()]})"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.split()) == (0, [])
+
+
+def test_checking_a_file_loads_no_xarray(tmp_path):
+    """It brings pandas along; together they take as long as all the rest of `dmoc check`."""
+    script = (
+        "import sys\nfrom dmoc.cli.app import main\n"
+        "try:\n    main(['solve', 'point_to_point', '--out', 'p.nc', '--quiet'])\nexcept SystemExit: pass\n"
+        "try:\n    main(['check', 'p.nc'])\nfinally:\n"
+        "    print(*sorted({'xarray', 'pandas', 'dask'} & sys.modules.keys()), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.split()) == (0, []) and "check" in done.stdout
+
+
+def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
+    """Importing a submodule binds its name on the package, over the function of the same name."""
+    import dmoc
+
+    modules = {path.name for path in ROOT.iterdir()}
+    assert not modules & set(dmoc.__all__)
