@@ -39,7 +39,7 @@ _new: OrderedDict[Hashable, Any] = OrderedDict()
 _use_files = True
 
 
-def kept(make: Callable[[], T], *key: Any) -> T:
+def remembered(make: Callable[[], T], *key: Any) -> T:
     """What `make` gives, or gave before for the same key."""
     try:
         name = identity(key)
@@ -58,11 +58,11 @@ def kept(make: Callable[[], T], *key: Any) -> T:
     return found
 
 
-class kept_property(cached_property):  # noqa: N801 - used as a decorator
+class remembered_property(cached_property):  # noqa: N801 - used as a decorator
     """A property whose value is kept for all equal objects."""
 
     def __init__(self, make: Callable[[Any], Any]):
-        super().__init__(lambda owner: kept(partial(make, owner), make.__qualname__, owner))
+        super().__init__(lambda owner: remembered(partial(make, owner), make.__qualname__, owner))
         self.__doc__ = make.__doc__
 
 

@@ -1,9 +1,10 @@
-"""The cubic spline through given points on NumPy alone: importing SciPy's takes longer than a small solve."""
+"""A cubic spline, motion with an error estimate, a root: importing SciPy takes longer than a small solve."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 
 # A coupling of two unknowns below this share of them changes no digit.
@@ -85,3 +86,42 @@ def _tridiagonal(below: np.ndarray, above: np.ndarray, right: np.ndarray) -> np.
         below, above, right = further_below / pivot, further_above / pivot, known / pivot
         reach *= 2
     return right
+
+
+def adams(motion: dict[str, ca.SX], places: np.ndarray, tol: float, most_steps: int) -> ca.Function:
+    """Adams' method of variable order for `motion`: its "ode", in "x", "t" and "p", from t = 0 on.
+
+    The states at increasing `places` of t are the columns of "xf". Scale the state to about 1: errors
+    are `tol` relative and a thousandth of that absolute. Called, it prints nothing and ends in bounded
+    time: with a RuntimeError after `most_steps` from one place to the next, or at a singularity.
+
+    References
+    ----------
+    A. C. Hindmarsh et al., SUNDIALS, ACM Trans. Math. Softw. 31 (2005).
+    """
+    settings = {
+        "reltol": tol,
+        "abstol": 1e-3 * tol,
+        "linear_multistep_method": "adams",
+        "nonlinear_solver_iteration": "functional",
+        "max_num_steps": most_steps,
+        # not from the first place: the same steps whatever places are asked for
+        "step0": 1e-7,
+        "disable_internal_warnings": True,
+        "show_eval_warnings": False,
+    }
+    return ca.integrator("adams", "cvodes", motion, 0.0, places.tolist(), settings)
+
+
+def root(function: Callable[[float], float], a: float, b: float, tol: float) -> float:
+    """Where a function changes its sign between a and b: false position by the Illinois rule.
+
+    M. Dowell, P. Jarratt, BIT 11 (1971): an end that stays counts half, so that both come closer.
+    """
+    at_a, at_b = function(a), function(b)
+    while at_b and abs(b - a) > tol:
+        c = b - at_b * (b - a) / (at_b - at_a)
+        at_c = function(c)
+        a, at_a = (b, at_b) if at_b * at_c < 0 else (a, 0.5 * at_a)
+        b, at_b = c, at_c
+    return b

@@ -15,8 +15,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
+from dmoc.motion.step import step_map
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.rows import with_symbols
 

@@ -14,7 +14,7 @@ from dmoc.exports.numbers import Numbers
 from dmoc.exports.residual import path_symbols, residual_of, velocities_of
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
 from dmoc.nlp.ipopt import Answer, make_solver, path_of
 from dmoc.nlp.transcription import NLP, check_mesh, transcribe_onto, units_of
@@ -27,7 +27,7 @@ class Planner:
 
     scene: Scene
     nlp: NLP
-    guess: Guess
+    guess: DiscretePath
 
     @classmethod
     def of(cls, problem: TransferProblem, order: int, steps: int, hold: bool, guess: Any = None) -> Planner:

@@ -15,10 +15,8 @@ from dmoc.guess.coast import (
     coast,
     lone_attractor,
     orbital_rates,
-    spiral_between,
-    velocity_change_between,
-    windings_between,
 )
+from dmoc.guess.open_ends import spiral_between, velocity_change_between, windings_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 

@@ -10,11 +10,13 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.guess.around import path_around, shortest_flyable
-from dmoc.guess.coast import attractors_of, end_estimates, lone_attractor, orbital_rates, spiral_between
+from dmoc.guess.coast import attractors_of, lone_attractor, orbital_rates
+from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, node_fractions, node_weights, step_nodes, uniform_mesh
+from dmoc.motion.mesh import node_fractions, node_weights, step_nodes, uniform_mesh
 from dmoc.motion.momenta import legendre_momenta
+from dmoc.motion.path import DiscretePath
 from dmoc.scene.constraints import KeepOut
 from dmoc.scene.problem import TransferProblem
 
@@ -28,7 +30,7 @@ GUESSED, NODES_A_TURN = 2000, 100
 
 def starting_guess(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
-) -> Guess:
+) -> DiscretePath:
     """A guess on the mesh, from what is given, else from the problem's own, else from its physics.
 
     Raises
@@ -38,7 +40,7 @@ def starting_guess(
     """
     given = problem.guess if given is None else given
     given = getattr(given, "path", given)
-    if isinstance(given, Guess):
+    if isinstance(given, DiscretePath):
         if given.position.shape[1] != problem.dimension:
             raise ValueError(
                 f"guess has {given.position.shape[1]} axes but the problem has {problem.dimension}"
@@ -63,11 +65,13 @@ def starting_guess(
         position[place, known] = end.fixed()[0][known]
     controls = (len(mesh) - 1 if hold else len(fractions), problem.actuator.size(problem.dimension))
     mass = np.full(len(fractions), problem.mass)
-    guess = Guess(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+    guess = DiscretePath(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
-def guess_on(problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None) -> Guess:
+def guess_on(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
+) -> DiscretePath:
     """A starting guess; on a mesh of many steps by way of fewer, where these follow its revolutions as well."""
     fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
     if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
@@ -77,19 +81,21 @@ def guess_on(problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool,
     return starting_guess(problem, mesh, order, hold, given)
 
 
-def angle_around(problem: TransferProblem, guess: Guess) -> float:
+def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
     """About the angle that a path turns through around all attractors [rad]."""
     rates = orbital_rates(problem, guess.position)
     return float(np.trapezoid(rates, guess.duration * guess.fractions))
 
 
-def is_uneven(problem: TransferProblem, guess: Guess) -> bool:
+def is_uneven(problem: TransferProblem, guess: DiscretePath) -> bool:
     """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
     rates = orbital_rates(problem, guess.position)
     return bool(rates.max() > UNEVEN * rates.min())
 
 
-def graded_guess(problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None) -> Guess:
+def graded_guess(
+    problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
+) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
     fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
     rates = orbital_rates(problem, fine.position)
@@ -98,7 +104,7 @@ def graded_guess(problem: TransferProblem, steps: int, order: int, hold: bool, g
     return starting_guess(problem, mesh, order, hold, given)
 
 
-def _force_along(problem: TransferProblem, guess: Guess) -> np.ndarray:
+def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
     """The controls that take the body along a guess, by the discrete equations; within the limits.
 
     A path that meets its equations also has multipliers near the right ones, by least squares.

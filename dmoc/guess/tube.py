@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.guess.coast import MANY_TURNS, center_of, lone_attractor
 from dmoc.guess.starting import angle_around
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.scene.constraints import Constraint
 from dmoc.scene.problem import TransferProblem
 
@@ -34,7 +34,7 @@ class _Tube(Constraint):
         return "stays near a path"
 
 
-def in_tube(problem: TransferProblem, guess: Guess) -> TransferProblem | None:
+def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | None:
     """The problem with a tube around a guess, where that helps: limited forces, many revolutions.
 
     From a guess alone Ipopt's first steps go far; over many revolutions that leads to places from which it
@@ -51,7 +51,7 @@ def in_tube(problem: TransferProblem, guess: Guess) -> TransferProblem | None:
     return replace(problem, constraints=(_Tube(guess.position - width, guess.position + width),))
 
 
-def out_of_tube(path: Guess) -> Guess:
+def out_of_tube(path: DiscretePath) -> DiscretePath:
     """An answer within a tube, to go on from without it."""
     multipliers = {name: value for name, value in path.multipliers.items() if name != "node:column:position"}
     return replace(path, multipliers=multipliers)

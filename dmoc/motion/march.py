@@ -9,9 +9,11 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
-from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, node_fractions, step_nodes, uniform_mesh
+from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.step import step_map
 from dmoc.scene.problem import TransferProblem
 
 # Steps of one piece of a forward march: a map of 100,000 steps takes ten times longer to build than to run.
@@ -105,7 +107,7 @@ def simulate(
 
 def _given_path(
     problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
-) -> Guess:
+) -> DiscretePath:
     """Controls on a mesh, checked, as a path that stays at the start."""
     mesh = uniform_mesh(400 if steps is None else whole("steps", steps))
     nodes = len(node_fractions(mesh, scheme(order)))
@@ -125,10 +127,12 @@ def _given_path(
     )
     position, velocity = problem.start.fixed()
     mass = np.full(nodes, problem.mass)
-    return Guess(mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity)
+    return DiscretePath(
+        mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity
+    )
 
 
-def node_masses(dynamics: Dynamics, path: Guess, mass: float) -> np.ndarray:
+def node_masses(dynamics: Dynamics, path: DiscretePath, mass: float) -> np.ndarray:
     """Masses of the nodes [kg], shape (nodes,), from that at the start and the controls of a path.
 
     m_i = m_0 - h sum_j A_ij flow_j with the Lobatto IIIA matrix A, as in the transcription.
@@ -149,7 +153,7 @@ def node_masses(dynamics: Dynamics, path: Guess, mass: float) -> np.ndarray:
 
 def rollout(
     dynamics: Dynamics,
-    path: Guess,
+    path: DiscretePath,
     start_time: float,
     position: np.ndarray,
     momentum: np.ndarray,
@@ -175,7 +179,7 @@ def rollout(
 
 
 def _advance(
-    dynamics: Dynamics, path: Guess, start_time: float, compensated: bool = False
+    dynamics: Dynamics, path: DiscretePath, start_time: float, compensated: bool = False
 ) -> tuple[ca.Function, list]:
     """(state, m, u, t, h) -> the state one step later, and its inputs for all steps side by side.
 
@@ -194,7 +198,7 @@ def _advance(
     return advance.expand() if explicit else advance, inputs
 
 
-def _inputs(path: Guess, start_time: float) -> list[np.ndarray]:
+def _inputs(path: DiscretePath, start_time: float) -> list[np.ndarray]:
     """Masses, controls, begin and length of all steps, side by side."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
     at = step_nodes(steps, rule)

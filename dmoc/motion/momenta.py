@@ -7,14 +7,16 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.memory import kept
-from dmoc.motion.dynamics import Dynamics, step_momenta
+from dmoc.basics.memory import remembered
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, step_nodes
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.step import step_momenta
 
 
 def end_momenta(
-    dynamics: Dynamics, path: Guess, start_time: float, momenta: np.ndarray | None = None
+    dynamics: Dynamics, path: DiscretePath, start_time: float, momenta: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
 
@@ -32,13 +34,13 @@ def end_momenta(
     return p, np.array(v).T.reshape(-1, n)
 
 
-def legendre_momenta(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
     momenta = legendre_function(dynamics, path.order, path.hold)(*_given(path, start_time))
     return np.array([np.array(momentum).T.reshape(len(path.mesh) - 1, -1) for momentum in momenta])
 
 
-def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
 
     By the implicit function theorem from the slopes B of the momenta: p_0 = -P_0, P_1 = .. = P_{s-1} = 0
@@ -47,7 +49,7 @@ def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndar
     """
     n, s, steps = dynamics.dimension, scheme(path.order).degree, len(path.mesh) - 1
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
-    function = kept(make, "legendre slopes", dynamics, path.order, path.hold)
+    function = remembered(make, "legendre slopes", dynamics, path.order, path.hold)
     slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
     inner, start = slopes[:, : n * s, n:], np.zeros((steps, n * s, 2 * n))
     start[:, :, :n], start[:, :n, n:] = -slopes[:, : n * s, :n], -np.eye(n)
@@ -61,7 +63,7 @@ def step_matrices(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndar
     return np.concatenate([moves[:, n * (s - 1) :], momenta], axis=1)
 
 
-def _given(path: Guess, start_time: float) -> tuple:
+def _given(path: DiscretePath, start_time: float) -> tuple:
     """What the functions of a step are given, the steps of a path side by side."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
     at, origin = step_nodes(steps, rule), path.position[0]
@@ -88,7 +90,7 @@ def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function
 
     q are the s + 1 positions stacked, from `origin` [m]; u the controls of the nodes stacked, or of the step.
     """
-    return kept(partial(_legendre_function, dynamics, order, hold), "legendre", dynamics, order, hold)
+    return remembered(partial(_legendre_function, dynamics, order, hold), "legendre", dynamics, order, hold)
 
 
 def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:

@@ -9,17 +9,19 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.memory import kept
-from dmoc.motion.dynamics import Dynamics, weighted
+from dmoc.basics.memory import remembered
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, step_nodes
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.step import weighted
 
 # Where the independent integrator gives up: a path that needs more parts runs into a singularity.
 MOST_PARTS = 1_000_000
 
 
 def reference(
-    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+    dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Position [m] and velocity [m/s] at the goal by DOP853, from the start with the path's controls.
 
@@ -36,7 +38,7 @@ def reference(
     n, steps = dynamics.dimension, len(path.mesh) - 1
     control = _control_powers(dynamics, path)
     start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
-    march_one = kept(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
+    march_one = remembered(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
     given = march_one.mx_in()[:-2]
     constants = path.position[0], _tolerances(path, velocity, control)
     advance = ca.Function("advance", given, march_one(*given, *constants))
@@ -60,7 +62,7 @@ def reference(
     return np.full(n, np.nan), np.full(n, np.nan)
 
 
-def _control_powers(dynamics: Dynamics, path: Guess) -> np.ndarray:
+def _control_powers(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
     """Controls of every step as a polynomial in the fraction of the step, shape (size (s+1), steps)."""
     if path.hold:
         return path.control.T
@@ -71,7 +73,7 @@ def _control_powers(dynamics: Dynamics, path: Guess) -> np.ndarray:
     return powers.reshape(-1, powers.shape[2])
 
 
-def _tolerances(path: Guess, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
+def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
     """Absolute errors [m], [m/s], [kg] that do not matter: 1e-12 of what the motion is made of."""
     n, duration = path.position.shape[1], path.duration
     thrust = np.abs(control).max(initial=0.0) / path.mass.min()

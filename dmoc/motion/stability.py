@@ -8,8 +8,8 @@ import numpy as np
 
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess
 from dmoc.motion.momenta import step_matrices
+from dmoc.motion.path import DiscretePath
 
 # Frozen along a path the two differ by what the path changes within a step; where the linearisation is
 # constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.
@@ -35,7 +35,7 @@ class Growth:
 
 
 def growth_along(
-    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray, matrices: np.ndarray
+    dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray, matrices: np.ndarray
 ) -> Growth:
     """Growth of the steps of a path, from its `step_matrices` and velocities at the step ends [m/s]."""
     flow, constant = flow_matrices(dynamics, path, start_time, velocity)
@@ -63,7 +63,7 @@ def _rate_bound(flow: np.ndarray) -> np.ndarray:
 
 
 def flow_matrices(
-    dynamics: Dynamics, path: Guess, start_time: float, velocity: np.ndarray
+    dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
 ) -> tuple[np.ndarray, bool]:
     """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
     n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
@@ -73,7 +73,7 @@ def flow_matrices(
     return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
 
 
-def refuse_unstable(dynamics: Dynamics, guess: Guess, start_time: float, shortest: float) -> None:
+def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, shortest: float) -> None:
     """Refuse a mesh beyond the scheme's stability limit where that is known before the solve.
 
     It is known where the linearisation does not depend on the state; elsewhere the check of the

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import NLP
 from dmoc.scene.problem import TransferProblem
 
@@ -33,7 +33,7 @@ class Relaxed:
     """What one elastic NLP gave: the slacks, the path, whether it keeps all rows but for the slacks."""
 
     slack: np.ndarray
-    path: Guess
+    path: DiscretePath
     feasible: bool
     multipliers: dict[str, Any] = field(default_factory=dict)
 
@@ -109,7 +109,7 @@ class Relaxation:
         }
         return {"x": z, "p": p, "f": cost, "g": g}, settings
 
-    def __call__(self, problem: TransferProblem, guess: Guess, near: Relaxed | None = None) -> Relaxed:
+    def __call__(self, problem: TransferProblem, guess: DiscretePath, near: Relaxed | None = None) -> Relaxed:
         """Solve for a problem that the NLP accepts, from a path on its mesh, or from an answer near by."""
         lbx, ubx, lbg, ubg = self.nlp.bounds(problem)
         low, high = lbx[self.columns], ubx[self.columns]

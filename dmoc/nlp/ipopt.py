@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import short
-from dmoc.motion.mesh import Guess, node_weights
+from dmoc.motion.mesh import node_weights
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import NLP
 from dmoc.scene.problem import TransferProblem
 
@@ -141,7 +142,7 @@ def make_solver(
         ) from error
 
 
-def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -> Answer:
+def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: DiscretePath) -> Answer:
     """Solve an NLP for a problem it accepts, from a guess on its mesh."""
     lbx, ubx, lbg, ubg = nlp.bounds(problem)
     x0 = np.clip(nlp.pack(guess), lbx, ubx)
@@ -158,7 +159,7 @@ def run(solver: ca.Function, nlp: NLP, problem: TransferProblem, guess: Guess) -
     return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), calls, seconds)
 
 
-def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> Guess:
+def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> DiscretePath:
     """SI path and multipliers of an answer."""
     multipliers = {}
     for key, group, values, scale in _multiplier_groups(nlp, answer.lam_x, answer.lam_g):
@@ -166,7 +167,7 @@ def path_of(nlp: NLP, problem: TransferProblem, answer: Answer) -> Guess:
     return replace(nlp.unpack(answer.x, problem), multipliers=multipliers)
 
 
-def scaled_multipliers(nlp: NLP, guess: Guess) -> tuple[np.ndarray, np.ndarray]:
+def scaled_multipliers(nlp: NLP, guess: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
     lam_x, lam_g = np.zeros(nlp.columns.size), np.zeros(nlp.rows.size)
     for key, group, values, scale in _multiplier_groups(nlp, lam_x, lam_g):
         if key in guess.multipliers:
@@ -175,7 +176,7 @@ def scaled_multipliers(nlp: NLP, guess: Guess) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _multiplier_groups(nlp: NLP, lam_x: np.ndarray, lam_g: np.ndarray):
-    """(key, group, scaled vector, scale to SI densities) of each group; see `Guess.multipliers`."""
+    """(key, group, scaled vector, scale to SI densities) of each group; see `DiscretePath.multipliers`."""
     weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
     weights["control"] = weights["step" if nlp.hold else "node"]
     for layout, side, values, inverse in (

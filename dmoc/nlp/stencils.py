@@ -17,16 +17,10 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.memory import kept
-from dmoc.motion.dynamics import (
-    Dynamics,
-    point_function,
-    split_effects,
-    step_momenta,
-    step_velocities,
-    weighted,
-)
+from dmoc.basics.memory import remembered
+from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
+from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.assembly import Kernel, kernel
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.rows import Row, with_symbols
@@ -59,7 +53,7 @@ def formulas_of(problem: TransferProblem, order: int, hold: bool) -> Formulas:
     zones = [type(constraint) for constraint in problem.constraints]
     shape = problem.dimension, problem.free_duration, order, hold
     make = partial(_written, problem, scheme(order), hold)
-    return kept(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
+    return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
 def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Formulas:

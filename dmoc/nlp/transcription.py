@@ -11,11 +11,12 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, flag, number, of_kind, short, whole
-from dmoc.basics.memory import kept
+from dmoc.basics.memory import remembered
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.lobatto import Scheme, scheme
-from dmoc.motion.mesh import Guess, uniform_mesh
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Assembly, assemble
 from dmoc.nlp.blocks import Transcript
 from dmoc.nlp.layout import Layout
@@ -126,7 +127,7 @@ class NLP:
         """The objective in its own unit and sign."""
         return self.problem.objective.sense * scaled * self.units.cost
 
-    def pack(self, guess: Guess) -> np.ndarray:
+    def pack(self, guess: DiscretePath) -> np.ndarray:
         """Scaled unknowns of a guess that stands on this mesh."""
         parts = {
             "position": guess.position - self.units.origin,
@@ -141,12 +142,12 @@ class NLP:
             / self.columns.scales()
         )
 
-    def unpack(self, x: np.ndarray, problem: TransferProblem) -> Guess:
+    def unpack(self, x: np.ndarray, problem: TransferProblem) -> DiscretePath:
         """SI path of scaled unknowns."""
         values = np.asarray(x).ravel() * self.columns.scales()
         get = {group.name: group.of(values) for group in self.columns.groups}
         nodes = self.columns["position"].count
-        return Guess(
+        return DiscretePath(
             self.mesh,
             self.scheme.order,
             self.hold,
@@ -192,7 +193,7 @@ def transcribe(
     return transcribe_onto(problem, start, units_of(problem, start))
 
 
-def transcribe_onto(problem: TransferProblem, guess: Guess, units: Units, compiled: bool = False) -> NLP:
+def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units, compiled: bool = False) -> NLP:
     """The NLP on the mesh, order and kind of control of a guess."""
     rule = scheme(guess.order)
     script = Transcript(problem, rule, guess.hold, guess.mesh, units)
@@ -223,7 +224,7 @@ def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:
     return ends
 
 
-def units_of(problem: TransferProblem, guess: Guess) -> Units:
+def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     """Canonical units of a problem near a path.
 
     Length: extent of the path, origin at its centre. Time: the duration. Force: the largest used
@@ -251,10 +252,10 @@ def units_of(problem: TransferProblem, guess: Guess) -> Units:
     return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
 
 
-def _cost(problem: TransferProblem, guess: Guess, force: float) -> float:
+def _cost(problem: TransferProblem, guess: DiscretePath, force: float) -> float:
     """About the objective along a guess, with `force` [N] in place of its controls if that is not zero."""
     parts = problem.dimension, problem.objective, problem.actuator
-    rate, terminal = kept(partial(_cost_functions, problem), "cost", *parts)
+    rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
     # a few hundred nodes tell the size
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), 400)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]

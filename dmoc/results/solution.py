@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
@@ -27,7 +27,7 @@ class Solution:
     ----------
     problem : TransferProblem or None
         None after `load`: a file holds numbers, not the problem; see `attach`.
-    path : Guess
+    path : DiscretePath
         Positions [m], controls, masses [kg], boundary velocities [m/s] and multipliers on the mesh.
     time : array, shape (nodes,)
         Times of the nodes [s].
@@ -49,7 +49,7 @@ class Solution:
     """
 
     problem: TransferProblem | None
-    path: Guess
+    path: DiscretePath
     velocity: np.ndarray
     momentum: np.ndarray
     force: np.ndarray

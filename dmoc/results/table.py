@@ -5,7 +5,7 @@ which it brings along, it takes longer to load than a solution to be checked.
 
 Dimensions: node, end (of a step), step, axis, channel (one a control). Every multiplier group is a
 variable of its own, `multiplier_<side>_<name>`, whose attribute `key` is its name in
-`Guess.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
+`DiscretePath.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from dmoc.basics.files import AGAIN
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import Format, Table, one_line, read_table, write_table
 
@@ -112,9 +112,9 @@ def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
     )
 
 
-def _path(facts: dict[str, Any], table: Table) -> Guess:
+def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
     groups = [name for name in table if name.startswith("multiplier_")]
-    return Guess(
+    return DiscretePath(
         _array(table, "mesh"),
         int(facts["order"]),
         bool(facts["hold"]),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation, Relaxed
 from dmoc.nlp.ipopt import make_solver, path_of, run
 from dmoc.nlp.transcription import NLP, transcribe_onto, units_of
@@ -35,7 +35,7 @@ class Cause:
 
     Attributes
     ----------
-    path : Guess or None
+    path : DiscretePath or None
         A path that meets every row, if there is one after all.
     needs : tuple of str
         What would be enough, each by itself: "a force limit of 0.26 N (you gave 0.2 N)".
@@ -46,7 +46,7 @@ class Cause:
         is to blame.
     """
 
-    path: Guess | None = None
+    path: DiscretePath | None = None
     needs: tuple[str, ...] = ()
     rows: tuple[str, ...] = ()
     excess: float = np.inf
@@ -61,7 +61,7 @@ class Cause:
         return "; ".join(parts)
 
 
-def cause_of(problem: TransferProblem, guess: Guess) -> Cause:
+def cause_of(problem: TransferProblem, guess: DiscretePath) -> Cause:
     """Why there is no path near a guess, found on its mesh: limits relaxed one by one, then every row."""
     case = _Case(problem, guess)
     if (far := _far_off(case)) is not None:
@@ -162,7 +162,7 @@ class _Case:
     Limits are told of as those of `given`, which are smaller where they were raised.
     """
 
-    def __init__(self, problem: TransferProblem, guess: Guess, given: TransferProblem | None = None):
+    def __init__(self, problem: TransferProblem, guess: DiscretePath, given: TransferProblem | None = None):
         longest = problem.duration_bounds[1]
         self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
         self.problem = replace(problem, duration=longest, objective=Effort())
@@ -298,7 +298,7 @@ class _Case:
             rows=names
         )
 
-    def jumps(self, path: Guess) -> bool:
+    def jumps(self, path: DiscretePath) -> bool:
         """Whether a path leaps across a zone between two nodes: with enough force it can."""
         inside = np.linspace(0, 1, 9)[1:-1, None, None]
         chords = (1 - inside) * path.position[:-1] + inside * path.position[1:]

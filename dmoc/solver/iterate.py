@@ -9,7 +9,8 @@ import numpy as np
 
 from dmoc.effects.base import Conservative, Effect
 from dmoc.motion.dynamics import Dynamics, state_symbols
-from dmoc.motion.mesh import Guess, node_weights
+from dmoc.motion.mesh import node_weights
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
 from dmoc.nlp.transcription import NLP
 from dmoc.scene.constraints import Constraint, KeepOut, SpeedLimit
@@ -19,7 +20,7 @@ from dmoc.scene.problem import TransferProblem
 COUNT, SEEN = 10, 1e-9
 
 
-def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess: Guess) -> None:
+def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess: DiscretePath) -> None:
     """Refuse a guess at which an effect has no value.
 
     Raises
@@ -33,7 +34,7 @@ def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess:
             raise ValueError(_undefined_effect(problem, state))
 
 
-def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: Guess) -> None:
+def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePath) -> None:
     """Refuse a guess at which the objective, a row or one of their derivatives has no value.
 
     Raises
@@ -56,7 +57,7 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: Guess) -> N
 REMEDY = "stay where it is defined, or give another guess"
 
 
-def _states(problem: TransferProblem, guess: Guess) -> tuple[np.ndarray, ...]:
+def _states(problem: TransferProblem, guess: DiscretePath) -> tuple[np.ndarray, ...]:
     """Times, positions, velocities, masses of the nodes of a guess, side by side."""
     times = problem.start_time + guess.duration * guess.fractions
     velocity = np.gradient(guess.position, times, axis=0)

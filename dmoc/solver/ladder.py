@@ -12,8 +12,9 @@ from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.guess.tube import in_tube, out_of_tube
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
-from dmoc.motion.mesh import Guess, uniform_mesh
+from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import flow_matrices, refuse_unstable
 from dmoc.nlp.ipopt import Answer, Interrupt, Progress, Watch, make_solver, path_of, run
 from dmoc.nlp.transcription import NLP, transcribe_onto, units_of
@@ -72,11 +73,11 @@ class Climb:
         self.answer: Answer
 
     @property
-    def path(self) -> Guess:
+    def path(self) -> DiscretePath:
         """The last answer."""
         return path_of(self.nlp, self.problem, self.answer)
 
-    def up_to(self, first: Guess, given: Any = None) -> bool:
+    def up_to(self, first: DiscretePath, given: Any = None) -> bool:
         """Solve on the mesh of a first guess, by way of coarser meshes unless it brings multipliers along.
 
         On the coarsest the guess is made anew from what it was made from, `given`: brought there from
@@ -113,7 +114,7 @@ class Climb:
         limited = any("max_" in name for name in self.options or ())
         return self.answer.status in UNEXPLAINED and not limited and not (self.cause and self.cause.words())
 
-    def _by_half(self, first: Guess) -> bool:
+    def _by_half(self, first: DiscretePath) -> bool:
         """Where nothing tells why a mesh fails, one of half as many steps often does not."""
         if not self._unexplained or len(first.mesh) < 9:
             return False
@@ -124,7 +125,7 @@ class Climb:
             self.nlp, self.answer = failed
         return False
 
-    def _explained(self, start: Guess, rounding: float | None) -> bool:
+    def _explained(self, start: DiscretePath, rounding: float | None) -> bool:
         """Say why there is no path near a guess; where there is one, solve again from it."""
         if not self._unexplained or self.cause is not None or len(start.position) > MOST_EXPLAINED:
             return False
@@ -134,7 +135,7 @@ class Climb:
         self.cause = cause
         return False
 
-    def solve_on(self, guess: Guess, rounding: float | None = None) -> bool:
+    def solve_on(self, guess: DiscretePath, rounding: float | None = None) -> bool:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
         problem = self._rounded(rounding)
         if guess.multipliers:
@@ -146,7 +147,7 @@ class Climb:
             guess = out_of_tube(self.path)
         return self._attempt(guess, problem)
 
-    def _attempt(self, guess: Guess, problem: TransferProblem) -> bool:
+    def _attempt(self, guess: DiscretePath, problem: TransferProblem) -> bool:
         if self.interrupt.seen and self.levels:
             self.answer = replace(self.answer, status="stopped")
             return False
@@ -176,7 +177,7 @@ class Climb:
         engine: Any = self.problem.actuator
         return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
-    def _meshes(self, first: Guess) -> tuple[int, list[np.ndarray]]:
+    def _meshes(self, first: DiscretePath) -> tuple[int, list[np.ndarray]]:
         """The order of the coarse meshes, and all meshes up to the final one.
 
         The coarsest has 100 or 400 nodes, or as many as keep h omega below 1 on the guess: a mesh that
@@ -195,7 +196,7 @@ class Climb:
         steps = [count // (order // 2) for count in reversed(counts[1:])]
         return order, [*(np.interp(uniform_mesh(count), places, final) for count in steps), final]
 
-    def least_steps(self, guess: Guess) -> int:
+    def least_steps(self, guess: DiscretePath) -> int:
         """Steps that keep h omega below 1 along a guess, omega the fastest rate of the linearised motion.
 
         At most 400: where a guess strays to where no path would go, its rates mean nothing.

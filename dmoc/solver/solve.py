@@ -10,7 +10,7 @@ from dmoc.basics.arguments import flag, number, of_kind, short, whole
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around, graded_guess, guess_on, is_uneven, starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import Progress, scaled_multipliers
 from dmoc.nlp.transcription import check_mesh, transcribe_onto, units_of
 from dmoc.results.solution import Solution
@@ -104,7 +104,7 @@ def first_guess(
     hold: bool = False,
     guess: Any = None,
     mesh: Any = None,
-) -> Guess:
+) -> DiscretePath:
     """The guess on the last mesh; what is not given of order and steps is as the motion needs it."""
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
     first = guess_on(problem, ends, order or 2, hold, guess)
@@ -129,7 +129,7 @@ def _tolerance(value: Any) -> float:
     return tol
 
 
-def stationarity(problem: TransferProblem, path: Guess) -> float:
+def stationarity(problem: TransferProblem, path: DiscretePath) -> float:
     """Largest entry of the scaled gradient of the Lagrangian, over the unknowns that are not fixed [-]."""
     nlp = transcribe_onto(problem, path, units_of(problem, path))
     x, p = nlp.pack(path), nlp.parameters(problem)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.coast import center_of, lone_attractor, windings_between
+from dmoc.guess.coast import center_of, lone_attractor
+from dmoc.guess.open_ends import windings_between
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.mesh import Guess
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.constraints import KeepOut
 from dmoc.scene.problem import TransferProblem
@@ -29,13 +30,13 @@ class Optimum:
     ----------
     objective : float
         In the objective's own unit.
-    path : Guess
+    path : DiscretePath
     starts : tuple of str
         The guesses that led to it.
     """
 
     objective: float
-    path: Guess
+    path: DiscretePath
     starts: tuple[str, ...]
 
 
@@ -79,7 +80,7 @@ def _add(found: list[Optimum], new: Optimum) -> None:
     found.append(new)
 
 
-def _variants(problem: TransferProblem, base: Guess) -> Iterator[tuple[str, Guess]]:
+def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
     """Names and guesses, without end."""
     yield "default", base
     lone = lone_attractor(problem)
@@ -120,7 +121,7 @@ def _turned(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return turned[:, : offset.shape[1]]
 
 
-def _around(base: Guess, center: np.ndarray, radius: float) -> Iterator[tuple[str, np.ndarray]]:
+def _around(base: DiscretePath, center: np.ndarray, radius: float) -> Iterator[tuple[str, np.ndarray]]:
     """Bends of a path, zero at its ends, that take it past a zone on either side of it."""
     nearest = int(np.argmin(np.linalg.norm(base.position - center, axis=1)))
     nearest = min(max(nearest, 1), len(base.position) - 2)

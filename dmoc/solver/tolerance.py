@@ -9,11 +9,13 @@ import casadi as ca
 import numpy as np
 
 from dmoc.guess.starting import graded_guess, is_uneven, starting_guess
-from dmoc.motion.dynamics import Dynamics, state_symbols, step_map
+from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, node_weights, step_nodes
+from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import reference
+from dmoc.motion.step import step_map
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.transcription import NLP, check_mesh
 from dmoc.results.facts import Error
@@ -107,11 +109,11 @@ def _settled(climb: Climb, tol: float, best: _Found, reason: str) -> Solution:
     return climb.solution(tolerance=tol, error=best.error, reason=_words(climb.problem, climb.path, reason))
 
 
-def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) -> Guess:
+def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) -> DiscretePath:
     """A guess for the trial, with as many steps as the motion along it needs."""
     problem = climb.problem
 
-    def on(count: int) -> Guess:
+    def on(count: int) -> DiscretePath:
         first = starting_guess(problem, check_mesh(count), order, hold, guess)
         return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
 
@@ -120,14 +122,14 @@ def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) 
     return on(enough) if steps is None and enough > TRIAL_STEPS else first
 
 
-def _as_many_nodes(path: Guess, order: int) -> np.ndarray:
+def _as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:
     """The mesh of a path for another order, with about as many nodes and at least eight steps."""
     steps = max(8, (len(path.mesh) - 1) * path.order // order)
     places = np.linspace(0.0, 1.0, len(path.mesh))
     return path.mesh if order == path.order else np.interp(np.linspace(0.0, 1.0, steps + 1), places, path.mesh)
 
 
-def _best_order(problem: TransferProblem, path: Guess, objective: float, tol: float) -> tuple[int, str]:
+def _best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:
     """The order that pays, and why."""
     if path.hold:
         return 2, "held forces are second order whatever the scheme"
@@ -138,7 +140,7 @@ def _best_order(problem: TransferProblem, path: Guess, objective: float, tol: fl
     return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
 
 
-def _is_singular(problem: TransferProblem, path: Guess) -> bool:
+def _is_singular(problem: TransferProblem, path: DiscretePath) -> bool:
     """Whether controls that the cost is linear in stay between their limits for longer than a switch takes.
 
     On such arcs a control at the inner nodes of a step is not determined, and wanders.
@@ -149,7 +151,7 @@ def _is_singular(problem: TransferProblem, path: Guess) -> bool:
     return bool(inside.sum() > BETWEEN * len(inside))
 
 
-def switch_times(problem: TransferProblem, path: Guess) -> np.ndarray:
+def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """When a control that the cost is linear in passes the middle between its limits [s]."""
     fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
     above = _shares(problem, path) - 0.5
@@ -159,7 +161,7 @@ def switch_times(problem: TransferProblem, path: Guess) -> np.ndarray:
     return problem.start_time + path.duration * np.sort(at)
 
 
-def _shares(problem: TransferProblem, path: Guess) -> np.ndarray:
+def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
     u = ca.SX.sym("u", path.control.shape[1])
     rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
@@ -168,7 +170,7 @@ def _shares(problem: TransferProblem, path: Guess) -> np.ndarray:
     return (path.control - lower)[:, limited] / (upper - lower)[limited]
 
 
-def _corners(problem: TransferProblem, path: Guess, objective: float) -> np.ndarray:
+def _corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:
     """Steps in which a control jumps or a limit sets in or lets go: there higher derivatives jump.
 
     A limit acts in a step if loosening it by its own size would change the objective by a millionth.
@@ -193,7 +195,7 @@ def _corners(problem: TransferProblem, path: Guess, objective: float) -> np.ndar
     return np.unique(np.concatenate(found))
 
 
-def _parts(path: Guess, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
+def _parts(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
     """Into how many parts to cut each step.
 
     Two, but for those that together make little of the local errors; at corners as many as lead to the
@@ -215,7 +217,9 @@ def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
     return np.append(np.concatenate(pieces), mesh[-1])
 
 
-def _change(coarse: tuple[Guess, float], fine: tuple[Guess, float], parts: np.ndarray) -> tuple[float, float]:
+def _change(
+    coarse: tuple[DiscretePath, float], fine: tuple[DiscretePath, float], parts: np.ndarray
+) -> tuple[float, float]:
     """Relative change of path and objective from one mesh to the next, at the step ends they share."""
     shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
     moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max()
@@ -240,7 +244,7 @@ def estimate(climb: Climb, changes: list[tuple[float, float]], most: float) -> E
     return Error(moved, cost, float(max(miss, slip)))
 
 
-def rounding_cost(problem: TransferProblem, path: Guess) -> float:
+def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
     """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
 
     The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
@@ -254,7 +258,7 @@ def rounding_cost(problem: TransferProblem, path: Guess) -> float:
     return float(abs(weights * density[:, 0] @ (width**2 / np.hypot(force, width))))
 
 
-def path_scales(path: Guess) -> tuple[float, float]:
+def path_scales(path: DiscretePath) -> tuple[float, float]:
     """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
     extent = float(np.linalg.norm(np.ptp(path.position, axis=0)))
     ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
@@ -263,7 +267,7 @@ def path_scales(path: Guess) -> tuple[float, float]:
     return extent, max(length / path.duration, ends) or extent / path.duration
 
 
-def local_errors(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarray:
+def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """Error of every step by integrating it again with two halves of order 8, over extent and speed [-]."""
     rule, fine = scheme(path.order), scheme(8)
     n, steps = dynamics.dimension, len(path.mesh) - 1
@@ -290,7 +294,7 @@ def local_errors(dynamics: Dynamics, path: Guess, start_time: float) -> np.ndarr
     return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)
 
 
-def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
+def control_jumps(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """Steps within which a limited control goes from near one of its limits to near another."""
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
     control = path.control
@@ -304,7 +308,7 @@ def control_jumps(problem: TransferProblem, path: Guess) -> np.ndarray:
     return np.flatnonzero((change > 0.2) & (change > 3 * np.maximum(around[:-4], around[4:])))
 
 
-def _words(problem: TransferProblem, path: Guess, reason: str) -> str:
+def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
     """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
     times = switch_times(problem, path)
     # several within two steps of each other are one burn that this mesh does not resolve

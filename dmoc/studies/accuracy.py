@@ -17,7 +17,8 @@ from dmoc.basics.memory import forget
 from dmoc.guess.starting import guess_on, starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess, uniform_mesh
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import reference as fly
 from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
@@ -259,7 +260,7 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compile
     return Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
 
 
-def _miss(problem: TransferProblem, path: Guess | None, scales: tuple[float, float]) -> float:
+def _miss(problem: TransferProblem, path: DiscretePath | None, scales: tuple[float, float]) -> float:
     """By how much the independent integrator misses the goal of a path, of an extent [m] or speed [m/s]."""
     if path is None or not np.isfinite(path.control).all():
         return np.nan

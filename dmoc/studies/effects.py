@@ -23,8 +23,8 @@ from dmoc.effects import (
 )
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import Guess
 from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import reference
 from dmoc.nlp.stencils import formulas_of
 from dmoc.nlp.transcription import transcribe_onto, units_of
@@ -116,7 +116,7 @@ def _name(effect: Effect) -> str:
     return ", ".join(words)
 
 
-def _one(problem: TransferProblem, path: Guess, effect: Effect, name: str, listed: bool) -> Influence:
+def _one(problem: TransferProblem, path: DiscretePath, effect: Effect, name: str, listed: bool) -> Influence:
     alone = tuple(other for other in problem.effects if other is not effect)
     without = replace(problem, effects=alone)
     scene = problem if listed else replace(problem, effects=(*problem.effects, effect))
@@ -136,7 +136,7 @@ def _one(problem: TransferProblem, path: Guess, effect: Effect, name: str, liste
     )
 
 
-def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect) -> float:
+def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: Effect) -> float:
     """Largest change of the acceleration by one effect along the path, at the step ends [m/s^2]."""
     n = problem.dimension
     t, q, v, m = state_symbols(n)
@@ -150,13 +150,13 @@ def _largest_acceleration(problem: TransferProblem, path: Guess, effect: Effect)
     return float(np.linalg.norm(pulls, axis=0).max())
 
 
-def _instructions(problem: TransferProblem, path: Guess) -> int:
+def _instructions(problem: TransferProblem, path: DiscretePath) -> int:
     """Instructions of one evaluation of node, step and ends with their derivatives."""
     kernels = [stencil.kernel for stencil in formulas_of(problem, path.order, path.hold).stencils]
     return sum(part.n_instructions() for kernel in kernels for part in kernel.functions.values())
 
 
-def _seconds(path: Guess, *problems: TransferProblem) -> np.ndarray:
+def _seconds(path: DiscretePath, *problems: TransferProblem) -> np.ndarray:
     """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s]; they take turns."""
     taken = np.empty((REPEATS, len(problems)))
     cases = []

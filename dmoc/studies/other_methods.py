@@ -15,7 +15,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.mesh import Guess, uniform_mesh
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUS, make_solver, tolerance
 from dmoc.scene.problem import TransferProblem
 
@@ -103,7 +104,7 @@ def as_nlp(problem: TransferProblem, made: Formulation, steps: int) -> Any:
     )
 
 
-def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[Guess, int]:
+def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
     """The ends and controls a method found, in the form that the independent integrator takes."""
     ends, forces = (part.full() for part in ca.Function("read", [made.x], [made.ends, made.controls])(x))
     n, points = problem.dimension, np.array(made.points)
@@ -115,14 +116,16 @@ def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -
     position = np.linspace(ends[:n, 0], ends[:n, 1], steps + 1)
     mass = np.full(steps + 1, problem.mass)
     duration, velocities = problem.duration_bounds[0], (ends[n:, 0], ends[n:, 1])
-    return Guess(uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities), forces.shape[1]
+    return DiscretePath(
+        uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities
+    ), forces.shape[1]
 
 
 @dataclass(frozen=True)
 class Run:
     """One solve, timed once. Its path has the goal that it believes to reach."""
 
-    path: Guess | None
+    path: DiscretePath | None
     nodes: int
     objective: float
     status: str

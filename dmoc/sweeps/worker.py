@@ -19,7 +19,7 @@ from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
-    from dmoc.motion.mesh import Guess
+    from dmoc.motion.path import DiscretePath
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
 
@@ -79,7 +79,7 @@ def failure(status: str, message: Any) -> dict[str, Any]:
     return {"status": status, "message": " ".join(str(message).split())}
 
 
-def pack(path: Guess) -> str:
+def pack(path: DiscretePath) -> str:
     """A path as text, exact to the last bit."""
     import numpy as np
 
@@ -93,11 +93,11 @@ def pack(path: Guess) -> str:
     return base64.b64encode(buffer.getvalue()).decode()
 
 
-def unpack(text: str) -> Guess:
+def unpack(text: str) -> DiscretePath:
     """The path that `pack` wrote."""
     import numpy as np
 
-    from dmoc.motion.mesh import Guess
+    from dmoc.motion.path import DiscretePath
 
     with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as held:
         arrays = dict(held)
@@ -105,7 +105,7 @@ def unpack(text: str) -> Guess:
         name.removeprefix(MULTIPLIER): arrays.pop(name) for name in list(arrays) if name.startswith(MULTIPLIER)
     }
     order, hold, duration = (arrays.pop(name).item() for name in ("order", "hold", "duration"))
-    return Guess(order=order, hold=hold, duration=duration, multipliers=multipliers, **arrays)
+    return DiscretePath(order=order, hold=hold, duration=duration, multipliers=multipliers, **arrays)
 
 
 @lru_cache(maxsize=4)

@@ -12,7 +12,7 @@ import pytest
 import dmoc.basics.memory
 from dmoc import solve, verify
 from dmoc.basics import cache
-from dmoc.basics.memory import forget, kept, store
+from dmoc.basics.memory import forget, remembered, store
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem_file import load_problem
 
@@ -66,29 +66,29 @@ def test_a_process_writes_when_it_ends(own_folder):
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     assert files(own_folder)
     next_process()
-    assert kept(must_not_be_made, "Dynamics.acceleration", Dynamics(2)).n_in() == 5
+    assert remembered(must_not_be_made, "Dynamics.acceleration", Dynamics(2)).n_in() == 5
 
 
 @pytest.mark.parametrize("change", ["cut", "empty", "one bit", "longer"])
 def test_a_file_that_is_not_as_it_was_written_is_made_anew(change, own_folder):
-    assert kept(lambda: "made", "test") == "made"
+    assert remembered(lambda: "made", "test") == "made"
     next_process()
-    assert kept(must_not_be_made, "test") == "made"
+    assert remembered(must_not_be_made, "test") == "made"
     forget(files=True)
     (file,) = files(own_folder)
     good = file.read_bytes()
     bit = good[:-3] + bytes([good[-3] ^ 1]) + good[-2:]
     file.write_bytes({"cut": good[:-1], "empty": b"", "one bit": bit, "longer": good + b"."}[change])
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
     store()
     assert file.read_bytes() != good, "the spoiled file must have been replaced"
 
 
 def test_other_sources_have_other_files(monkeypatch):
-    assert kept(lambda: "made", "test") == "made"
+    assert remembered(lambda: "made", "test") == "made"
     next_process()
     monkeypatch.setattr(dmoc.basics.memory, "VERSION", "another")
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
 
 
 def copied(place, code):
@@ -123,33 +123,33 @@ def test_a_package_in_an_archive_works_without_files(tmp_path, own_folder):
 
 
 def test_what_cannot_be_read_is_made_anew(own_folder):
-    kept(lambda: "made", "test")
+    remembered(lambda: "made", "test")
     next_process()
     (file,) = files(own_folder)
     cache.write(file.name, b"cno_such_module\nno_such_class\n.")
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
 
 
 def test_what_measures_does_without_files():
-    assert kept(lambda: "made", "test") == "made"
+    assert remembered(lambda: "made", "test") == "made"
     store()
     forget()
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
 
 
 def test_objects_of_the_user_are_never_written(own_folder):
-    kept(lambda: "made", "test", lambda: None)
+    remembered(lambda: "made", "test", lambda: None)
     store()
     assert not own_folder.exists() or not files(own_folder)
 
 
 def test_a_scene_with_a_long_table_has_no_files(own_folder):
     """Each would hold the table: a few scenes with 20,000 rows took 135 MB, and seconds at the end."""
-    assert kept(lambda: "made", "test", tuple(range(1000))) == "made"
-    assert kept(must_not_be_made, "test", tuple(range(1000))) == "made"
+    assert remembered(lambda: "made", "test", tuple(range(1000))) == "made"
+    assert remembered(must_not_be_made, "test", tuple(range(1000))) == "made"
     next_process()
     assert not own_folder.exists() or not files(own_folder)
-    assert kept(lambda: "made anew", "test", tuple(range(1000))) == "made anew"
+    assert remembered(lambda: "made anew", "test", tuple(range(1000))) == "made anew"
 
 
 def test_the_folder_is_private(own_folder):
@@ -159,11 +159,11 @@ def test_the_folder_is_private(own_folder):
 
 @pytest.mark.parametrize("mode", [0o770, 0o707])
 def test_a_folder_that_others_may_write_to_is_not_used(own_folder, mode):
-    kept(lambda: "made", "test")
+    remembered(lambda: "made", "test")
     next_process()
     own_folder.chmod(mode)
     assert cache.folder() is None
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
 
 
 def test_a_folder_that_is_a_link_is_not_used(own_folder, tmp_path):
@@ -198,7 +198,7 @@ def test_a_path_that_is_not_absolute_does_not_count_and_without_a_home_there_is_
     monkeypatch.setenv("XDG_CACHE_HOME", given)
     monkeypatch.setattr("os.path.expanduser", lambda path: path)
     assert cache.folder() is None
-    kept(lambda: "made", "test")
+    remembered(lambda: "made", "test")
     store()
     assert not Path("cache").exists()
 
@@ -207,20 +207,20 @@ def test_where_the_folder_cannot_be_made_everything_is_made_anew(tmp_path, monke
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert cache.folder() is None
-    kept(lambda: "made", "test")
+    remembered(lambda: "made", "test")
     next_process()
-    assert kept(lambda: "made anew", "test") == "made anew"
+    assert remembered(lambda: "made anew", "test") == "made anew"
 
 
 def test_a_disk_that_can_only_be_read_from_is_read(monkeypatch):
-    kept(lambda: "made", "test")
+    remembered(lambda: "made", "test")
     next_process()
 
     def refuse(path):
         raise OSError(errno.EROFS, "Read-only file system", path)
 
     monkeypatch.setattr("os.utime", refuse)
-    assert kept(must_not_be_made, "test") == "made"
+    assert remembered(must_not_be_made, "test") == "made"
 
 
 def test_the_files_used_last_are_kept(own_folder, monkeypatch):

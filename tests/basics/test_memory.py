@@ -29,7 +29,7 @@ from dmoc import (
     circular_motion,
     tabulated_motion,
 )
-from dmoc.basics.memory import identity, kept
+from dmoc.basics.memory import identity, remembered
 from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.stencils import formulas_of
 
@@ -197,7 +197,7 @@ def test_what_may_change_without_a_rebuild_shares_functions():
 def test_what_cannot_be_told_apart_by_its_numbers_is_made_anew(value):
     with pytest.raises(TypeError):
         identity(value)
-    assert kept(object, "test", value) is not kept(object, "test", value)
+    assert remembered(object, "test", value) is not remembered(object, "test", value)
 
 
 def test_a_class_with_a_method_of_the_user_s_is_made_anew(monkeypatch):

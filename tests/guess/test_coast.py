@@ -6,8 +6,9 @@ import pytest
 from scipy.integrate import DOP853, solve_ivp
 
 from dmoc import PointGravity, RotatingFrame, Spring, State, ThirdBody, TransferProblem
+from dmoc.basics.numerics import root
 from dmoc.guess.coast import coast
-from dmoc.guess.spiral import Spiral, _root
+from dmoc.guess.spiral import Spiral
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import coefficients
 
@@ -108,7 +109,7 @@ def test_a_spiral_without_angular_momentum_is_nowhere(capfd):
 )
 def test_the_root_between_two_places(function, root):
     calls = []
-    found = _root(lambda x: calls.append(x) or function(x), -1.0, 1.0, 1e-6)
+    found = root(lambda x: calls.append(x) or function(x), -1.0, 1.0, 1e-6)
     assert found == pytest.approx(root, abs=1e-6)
     assert len(calls) < 60
 

@@ -8,9 +8,9 @@ import pytest
 
 from dmoc import solve
 from dmoc.checks.verification import verify
-from dmoc.guess.spiral import Winding
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube
+from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import find, load_problem
 from dmoc.solver.starts import local_optima

@@ -21,7 +21,8 @@ from dmoc import (
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import simulate
-from dmoc.motion.mesh import Guess, node_fractions, node_weights, uniform_mesh
+from dmoc.motion.mesh import node_fractions, node_weights, uniform_mesh
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import reference
 from dmoc.scene.problem_file import load_problem
 
@@ -41,7 +42,7 @@ def held_path(problem, control, order=2, hold=True, mesh=None):
     mesh = uniform_mesh(len(control) if hold else (len(control) - 1) * 2 // order) if mesh is None else mesh
     nodes = len(node_fractions(mesh, scheme(order)))
     position, velocity = problem.start.fixed()
-    return Guess(
+    return DiscretePath(
         mesh,
         order,
         hold,

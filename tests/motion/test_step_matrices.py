@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from dmoc import Engine, Fuel, LinearDrag, PointGravity, RotatingFrame, Spring, State, TransferProblem, solve
-from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.momenta import end_momenta, step_matrices
+from dmoc.motion.step import step_map
 
 FROM, TO = State((1, 0.1), (0, 0.9)), State((-0.7, 1.1), (-0.8, -0.3))
 ACTS = (PointGravity(1.2), RotatingFrame(0.4), LinearDrag(0.3))

@@ -22,9 +22,9 @@ from dmoc import (
     UniformGravity,
     transcribe,
 )
-from dmoc.motion.dynamics import step_momenta
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
+from dmoc.motion.step import step_momenta
 
 MASS, DURATION, START_TIME = 2.5, 3.0, 0.7
 UNEVEN = np.array([0.0, 0.08, 0.2, 0.25, 0.5, 0.85, 1.0])

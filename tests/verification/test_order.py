@@ -14,8 +14,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dmoc import Effort, LinearDrag, Objective, PointGravity, RotatingFrame, State, TransferProblem, solve
-from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.step import step_map
 
 ORDERS = (2, 4, 6, 8)
 SLACK = 0.3

@@ -16,8 +16,9 @@ from dmoc import (
     UniformGravity,
     three_body,
 )
-from dmoc.motion.dynamics import Dynamics, step_map
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.step import step_map
 
 ORDERS = (2, 4, 6, 8)
 MASS = 1.7

@@ -1,0 +1,163 @@
+"""Likely states of ends that leave something free."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from dmoc.effects.gravity import PointGravity
+from dmoc.guess.coast import attractors_of, center_of, coast, lone_attractor
+from dmoc.guess.spiral import MOST_BENT, Spiral
+from dmoc.guess.winding import Winding
+from dmoc.scene.ends import Boundary
+from dmoc.scene.problem import TransferProblem
+
+# How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
+PASSES = 3
+
+
+# Orbits beyond this eccentricity, or this cosine of the angle between their planes, have no even change.
+MOST_ECCENTRIC, NEARLY_ROUND, OPPOSITE = 0.9, 0.3, -0.9
+
+
+def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Position and velocity of start and goal, NaN where nothing is known.
+
+    Near an attractor an end that leaves something open is where the other end coasts.
+    """
+    ends, times = (problem.start, problem.goal), (0.0, duration)
+    states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
+    whole = [not np.isnan(state).any() for state in states]
+    settled = [end.anchored and known for end, known in zip(ends, whole, strict=True)]
+    if attractors_of(problem) and any(whole) and not all(settled):
+        known = (settled if any(settled) else whole).index(True)
+        open_end = 1 - known
+        states[open_end] = _carried(problem, states[known], times[known], ends[open_end], times[open_end])
+    return states
+
+
+def velocity_change_between(problem: TransferProblem, states: Any) -> float:
+    """About what many revolutions from one orbit to another take [m/s]; see `Spiral.velocity_change`."""
+    attractor = lone_attractor(problem)
+    assert attractor is not None
+    start, goal = _from_center(problem, attractor, states)
+    return Spiral(attractor.mu, np.zeros(3), 1.0, start, goal).velocity_change
+
+
+def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Spiral | None:
+    """The spiral from start to goal, if one of them leaves its place open and the spiral ends there."""
+    ends = (problem.start, problem.goal)
+    from_goal = ends[1].anchored and not ends[0].anchored
+    spiral = _spiral(problem, duration, states, from_goal)
+    if spiral is None or all(end.anchored for end in ends):
+        return None
+    place = states[0 if from_goal else 1][0]
+    gap = _distance(_end_of(spiral, problem.dimension)[0], place)
+    return spiral if gap < 0.05 * _distance(place, spiral.center[: problem.dimension]) else None
+
+
+def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:
+    """Paths of an orbit that changes evenly between two states around a lone attractor, each with two facts.
+
+    They are its revolutions, and whether it is sure to be near the best: a nearly round orbit that need
+    not go beyond those of the ends for its phase. First the path whose number of revolutions fits the
+    duration best, and where none fits well one with one more and one less; or only that with so many
+    `more`. None where an end is open or the orbits are too different. A path is a function of the
+    fractions of the duration.
+    """
+    attractor = lone_attractor(problem)
+    if attractor is None or not (problem.start.anchored and problem.goal.anchored):
+        return []
+    start, goal = _from_center(problem, attractor, states)
+    spins = np.cross(*start), np.cross(*goal)
+    if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
+        return []
+    center = center_of(attractor, problem.dimension)
+
+    def positions(winding: Winding, fractions: np.ndarray) -> np.ndarray:
+        return winding.positions(fractions)[:, : problem.dimension] + center
+
+    windings = [Winding(attractor.mu, duration, start, goal, more or 0)]
+    if windings[0].eccentricity > MOST_ECCENTRIC or not windings[0].lasts:
+        return []
+    if more is None and abs(windings[0].bend) > MOST_BENT:
+        others = (Winding(attractor.mu, duration, start, goal, step) for step in (-1, 1))
+        windings += [other for other in others if other.turns != windings[0].turns and other.lasts]
+    found = [(partial(positions, winding), winding.turns) for winding in windings]
+    sure = abs(windings[0].bend) <= MOST_BENT and windings[0].eccentricity < NEARLY_ROUND
+    return [(*winding, sure) for winding in found]
+
+
+def _from_center(problem: TransferProblem, attractor: PointGravity, states: Any) -> list[tuple]:
+    """Start and goal with three axes, from the attractor."""
+    center, fill = center_of(attractor, problem.dimension), np.zeros(3 - problem.dimension)
+    return [(np.append(q - center, fill), np.append(v, fill)) for q, v in states]
+
+
+def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: bool) -> Spiral | None:
+    attractor = lone_attractor(problem)
+    if attractor is None:
+        return None
+    start, goal = _from_center(problem, attractor, states)
+    if not (np.any(start[0]) and np.any(goal[0])):
+        # in the attractor itself: refused, in words, when the effects are looked at
+        return None
+    center = np.pad(center_of(attractor, problem.dimension), (0, 3 - problem.dimension))
+    spiral = Spiral(attractor.mu, center, duration, start, goal, from_goal)
+    return spiral if spiral.eccentricity < MOST_ECCENTRIC else None
+
+
+def _end_of(spiral: Spiral, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity at the end that the motion decides."""
+    q, v = spiral.states(np.array([0.0 if spiral.from_goal else 1.0]))
+    return (q[0] + spiral.center)[:dimension], v[0, :dimension]
+
+
+def _carried(problem: TransferProblem, known: tuple, begin: float, end: Boundary, finish: float) -> tuple:
+    """A state at an open end, reached by coasting there from the known end.
+
+    Onto an orbit: half the time on the one and half on the other, then as a spiral leads there.
+    """
+    middle = 0.5 * (begin + finish)
+    state = _drift(problem, begin, middle, known)
+    likely = end.estimate(problem.start_time + middle, state)
+    orbit = not (end.anchored or np.isnan(likely).any())
+    state = _drift(problem, middle, finish, likely if orbit else state)
+    position, velocity = end.estimate(problem.start_time + finish, state)
+    if end.anchored:
+        state = (position, _turned(problem, state, position))
+    state = tuple(
+        np.where(np.isnan(at), here, at) for at, here in zip((position, velocity), state, strict=True)
+    )
+    for _ in range(PASSES if orbit else 0):
+        backward = begin > finish
+        spiral = _spiral(problem, abs(finish - begin), (state, known) if backward else (known, state), backward)
+        if spiral is not None:
+            state = end.estimate(problem.start_time + finish, _end_of(spiral, problem.dimension))
+    return state
+
+
+def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) -> tuple:
+    """A state some time later, or earlier, without thrust."""
+    states = coast(problem, begin, finish, state)
+    return state if states is None else tuple(np.split(states[-1], 2))
+
+
+def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:
+    """The velocity of a state as it would be at another place around the first attractor."""
+    q, v = state
+    center = center_of(attractors_of(problem)[0], len(q))
+    q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
+    up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
+    turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
+    return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]
+
+
+def _unit(x: np.ndarray) -> np.ndarray:
+    return x / (np.linalg.norm(x) or 1.0)
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b))

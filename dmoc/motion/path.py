@@ -1,0 +1,85 @@
+"""A path on a mesh, guessed or solved, and how it is carried from one mesh to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dmoc.basics.numerics import cubic_spline
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_fractions
+
+
+@dataclass(frozen=True)
+class DiscretePath:
+    """A path on a mesh, good enough to start from: SI units, one row a node.
+
+    Attributes
+    ----------
+    mesh : array, shape (steps+1,)
+        Step ends as fractions of the duration.
+    position, control, mass : arrays, shape (nodes, ...)
+        [m], the actuator's units, [kg]; with hold the controls are one row a step.
+    start_velocity, goal_velocity : arrays
+        [m/s].
+    multipliers : dict
+        Costates and bound multipliers by group, densities in time; empty for a plain guess.
+    """
+
+    mesh: np.ndarray
+    order: int
+    hold: bool
+    duration: float
+    position: np.ndarray
+    control: np.ndarray
+    mass: np.ndarray
+    start_velocity: np.ndarray
+    goal_velocity: np.ndarray
+    multipliers: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Fractions of the duration at the nodes, shape (nodes,)."""
+        return node_fractions(self.mesh, scheme(self.order))
+
+    def onto(self, mesh: np.ndarray, order: int, hold: bool) -> DiscretePath:
+        """The same path on another mesh, order and kind of control."""
+        if order == self.order and hold == self.hold and np.array_equal(mesh, self.mesh):
+            return self
+        old, new = self.fractions, node_fractions(mesh, scheme(order))
+        middles, old_middles = 0.5 * (mesh[1:] + mesh[:-1]), 0.5 * (self.mesh[1:] + self.mesh[:-1])
+        old_control = old_middles if self.hold else old
+        new_control = middles if hold else new
+        ends = (self.start_velocity * self.duration, self.goal_velocity * self.duration)
+        # the path must be smooth: its second differences are the forces
+        position = cubic_spline(old, self.position, ends)(new)
+        position[0], position[-1] = self.position[0], self.position[-1]
+        places = {
+            "node": (old, new),
+            "step": (old_middles, middles),
+            "between": (old_middles, middles),
+            "control": (old_control, new_control),
+        }
+        return replace(
+            self,
+            mesh=mesh,
+            order=order,
+            hold=hold,
+            position=position,
+            control=_between(old_control, self.control, new_control),
+            mass=np.interp(new, old, self.mass),
+            multipliers={name: _carry(name, value, places) for name, value in self.multipliers.items()},
+        )
+
+
+def _carry(name: str, value: np.ndarray, places: dict) -> np.ndarray:
+    kind = name.split(":")[0]
+    if kind == "smooth":
+        return cubic_spline(places["node"][0], value)(places["node"][1])
+    return _between(places[kind][0], value, places[kind][1]) if kind in places else value
+
+
+def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Linear interpolation of every column: never beyond the values it is made from."""
+    return np.stack([np.interp(new, old, column) for column in values.T], axis=1) if values.size else values

@@ -1,0 +1,139 @@
+"""The discrete equations: one step, the momenta at its ends, the one-step map. All per unit mass.
+
+One step of length h carries positions q_0 .. q_s at the Lobatto points c_j, with weights w_j and
+derivative matrix D (`lobatto`). With l the Lagrangian per unit mass and F the forces that do work:
+
+    v_i = 1/h sum_j D_ij q_j                                   velocities of the step
+    P_j = sum_i w_i D_ij dl/dv_i + h w_j (dl/dq_j + F_j / m_j)
+
+-P_0 is the momentum that leaves node 0, P_s the momentum that arrives at node s, P_j = 0 between.
+For s = 1 the rows P_s (of one step) + P_0 (of the next) divided by -h/m are equation (16) of M. Ekal,
+Derivation of a discrete variational integrator for rigid body translational motion,
+
+    (x_k - x_{k-1}) - (x_{k+1} - x_k) + h^2/m f_k = 0.
+
+Held forces g act with h w_j g on node j of their step.
+
+References
+----------
+J. E. Marsden, M. West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001).
+S. Leyendecker, S. Ober-Bloebaum, J. E. Marsden, M. Ortiz, Discrete mechanics and optimal control
+for constrained systems, Optim. Control Appl. Meth. 31 (2010).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.memory import remembered
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import Scheme
+
+
+def step_velocities(scheme: Scheme, h, q: Sequence) -> list:
+    """v_i = 1/h sum_j D_ij q_j, from displacements: no digits are lost far from the origin."""
+    moves = [position - q[0] for position in q[1:]]
+    return [weighted(row[1:], moves) / h for row in scheme.derivative]
+
+
+def step_momenta(scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequence, push: Sequence) -> list:
+    """P_0 .. P_s of one step [m/s].
+
+    Parameters
+    ----------
+    point : Function
+        (t, q, v, m) -> dl/dq, dl/dv, F/m; see `point_function`.
+    t0, h : scalar
+        Start and length of the step [s].
+    q : list of columns
+        Positions at the s + 1 nodes [m].
+    m : list of scalars
+        Masses there [kg].
+    push : list of columns
+        Actuator force per mass there [m/s^2].
+    """
+    v = step_velocities(scheme, h, q)
+    at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
+    # dl/dv is v and what effects add: the first part is one constant matrix, the second often nothing
+    added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
+    inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
+    moves = [position - q[0] for position in q[1:]]
+    return [
+        weighted(inertia[j, 1:], moves) / h
+        + weighted(scheme.weights * scheme.derivative[:, j], added)
+        + h * w * (dldq + force + push[j])
+        for j, (w, (dldq, _, force)) in enumerate(zip(scheme.weights, at, strict=True))
+    ]
+
+
+def step_map(dynamics: Dynamics, scheme: Scheme, hold: bool = False) -> ca.Function:
+    """The one-step map, as increments so that a caller can add them up without losing digits.
+
+    (q, p, m, u, t, h, origin) -> (dq, dp, v): position from `origin` [m], momentum per mass [m/s],
+    node masses [kg] (s+1), controls (size, s+1) or with hold (size), time [s], step [s], origin [m].
+    `v` are the velocities of the step at its nodes (dimension, s+1). Explicit at order 2 where no
+    effect looks at the velocity, Newton's method down to round-off elsewhere.
+    """
+    return remembered(partial(_step_map, dynamics, scheme, hold), "step", dynamics, scheme.order, hold)
+
+
+def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
+    n, s = dynamics.dimension, scheme.degree
+    q, p, origin = (ca.SX.sym(name, n) for name in ("q", "p", "origin"))
+    t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)
+    u = ca.SX.sym("u", dynamics.actuator.size(n), 1 if hold else s + 1)
+    given = [q, p, masses, u, t, h, origin]
+    names = ["q", "p", "m", "u", "t", "h", "origin"]
+    m = ca.vertsplit(masses)
+    push = [dynamics.actuator.force(u[:, 0 if hold else j]) / m[j] for j in range(s + 1)]
+
+    def point(t, r, v, m):
+        return dynamics.point(t, r + origin, v, m)
+
+    velocity = dynamics.velocity(t, q + origin, p, m[0])
+    dldq, _, force = point(t, q, velocity, m[0])
+    kick = dldq + force + push[0]
+    if s == 1 and not dynamics.depends_on_velocity:
+        increments = _increments(scheme, point, t, h, q, [h * (p + 0.5 * h * kick)], m, push)
+        return ca.Function("step", given, increments, names, ["dq", "dp", "v"])
+    # the unknowns are displacements in units of h times a typical speed: of order 1 whatever the scene
+    speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
+    y = ca.SX.sym("y", n * s)
+    moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
+    momenta = step_momenta(scheme, point, t, h, [q, *[q + move for move in moves]], m, push)
+    rows = ca.Function("rows", [y, *given], [ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed])
+    # convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off
+    settings = {"abstol": 1e-300, "abstolStep": 1e-11, "max_iter": 30, "error_on_fail": False}
+    newton = ca.rootfinder("newton", "fast_newton", rows, settings)
+    first = [c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]
+    start = ca.Function("start", given, [ca.vertcat(*first)])
+    finish = ca.Function("finish", [y, *given], _increments(scheme, point, t, h, q, moves, m, push))
+    arguments = [ca.MX.sym(name, *a.shape) for name, a in zip(names, given, strict=True)]
+    root = newton(start(*arguments), *arguments)
+    return ca.Function("step", arguments, finish(root, *arguments), names, ["dq", "dp", "v"])
+
+
+def _increments(scheme: Scheme, point, t, h, q, moves: Sequence, m: Sequence, push: Sequence) -> list:
+    """dq, dp, v from the displacements of the nodes; dp is the impulse h sum_j w_j (dl/dq_j + F_j / m_j)."""
+    v = [weighted(row[1:], moves) / h for row in scheme.derivative]
+    positions = [q, *[q + move for move in moves]]
+    at = [
+        point(t + c * h, *state)
+        for c, state in zip(scheme.points, zip(positions, v, m, strict=True), strict=True)
+    ]
+    accelerations = [dldq + force + thrust for (dldq, _, force), thrust in zip(at, push, strict=True)]
+    return [moves[-1], h * weighted(scheme.weights, accelerations), ca.horzcat(*v)]
+
+
+def weighted(weights: np.ndarray, terms: Sequence) -> Any:
+    """sum_i weights_i terms_i, leaving out weights that are zero."""
+    total = 0
+    for weight, term in zip(weights, terms, strict=True):
+        if weight != 0:
+            total = total + float(weight) * term
+    return total
