@@ -12,10 +12,12 @@ __version__ = "0.1.0"
 
 # Imported on first use, so that `dmoc --help` answers before CasADi is loaded.
 _HOMES = {
-    "dmoc.scene.actuator": ("Actuator",),
-    "dmoc.scene.forces": ("BallForce", "BoxForce", "FreeForce"),
+    "dmoc.parts.actuator": ("Actuator",),
+    "dmoc.parts.forces": ("BallForce", "BoxForce", "FreeForce"),
     "dmoc.scene.ends": ("Boundary", "Condition", "Moving", "State"),
-    "dmoc.scene.constraints": ("ApproachCone", "Constraint", "KeepIn", "KeepOut", "SpeedLimit"),
+    "dmoc.parts.constraint": ("Constraint",),
+    "dmoc.parts.zones": ("ApproachCone", "KeepIn", "KeepOut"),
+    "dmoc.parts.speed": ("SpeedLimit",),
     "dmoc.effects": (
         "J2",
         "Atmosphere",
@@ -42,10 +44,10 @@ _HOMES = {
         "tabulated_motion",
         "three_body",
     ),
-    "dmoc.scene.engines": ("Engine", "Nozzles"),
+    "dmoc.parts.engines": ("Engine", "Nozzles"),
     "dmoc.exports.export": ("export",),
     "dmoc.studies.drift": ("drift",),
-    "dmoc.scene.objectives": (
+    "dmoc.parts.objectives": (
         "Effort",
         "FinalHeight",
         "FinalMass",
@@ -57,7 +59,7 @@ _HOMES = {
     ),
     "dmoc.scene.orbits": ("CircularOrbit", "Orbit"),
     "dmoc.scene.problem": ("TransferProblem",),
-    "dmoc.scene.rows": ("Row",),
+    "dmoc.parts.rows": ("Row",),
     "dmoc.motion.march": ("Trajectory", "simulate"),
     "dmoc.results.solution": ("Solution", "SolveError", "load"),
     "dmoc.solver.solve": ("solve",),

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from dmoc.basics.docstrings import documented, first_line
 
@@ -35,11 +37,34 @@ class Part:
         ]
 
 
+class Attractor(NamedTuple):
+    """A point mass: gravitational parameter [m^3/s^2] and place [m], None for the origin."""
+
+    mu: float
+    center: tuple[float, ...] | None
+
+    def place(self, dimension: int) -> np.ndarray:
+        """Its place with so many axes [m]."""
+        return np.zeros(dimension) if self.center is None else np.array(self.center)
+
+
 class Effect(Part, ABC):
     """Something that acts on the body. Derive from `Conservative` or `Force`, never from this."""
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the effect has no meaning in this many dimensions."""
+
+    def attractor(self) -> Attractor | None:
+        """The point mass that it is, around which there are orbits; None for anything else."""
+        return None
+
+    def turns_frame(self) -> bool:
+        """Whether it makes the frame turn, in which orbits do not close."""
+        return False
+
+    def body_radius(self) -> float:
+        """Radius of the body at the origin where it tells one [m], else 0."""
+        return 0.0
 
 
 class Conservative(Effect):

@@ -50,6 +50,9 @@ class RotatingFrame(Conservative):
             drift = ca.vertcat(-self.rate * q[1], self.rate * q[0], *([0] if q.numel() == 3 else []))
         return ca.dot(v, drift) + 0.5 * ca.dot(drift, drift)
 
+    def turns_frame(self) -> bool:
+        return True
+
 
 @dataclass(frozen=True)
 class ClohessyWiltshire(Conservative):

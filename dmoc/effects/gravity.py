@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from dmoc.basics.arguments import number, vector
-from dmoc.effects.base import Conservative, need_dimension
+from dmoc.effects.base import Attractor, Conservative, need_dimension
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,9 @@ class PointGravity(Conservative):
         # sqrt and multiplication: a power of 3/2 in the derivative would dominate the step function
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 
+    def attractor(self) -> Attractor:
+        return Attractor(self.mu, self.center)
+
 
 @dataclass(frozen=True)
 class J2(Conservative):
@@ -105,6 +108,9 @@ class J2(Conservative):
         squared = ca.dot(q, q)
         pull = 0.5 * self.mu * self.j2 * self.radius**2 / (squared * ca.sqrt(squared))
         return pull if q.numel() == 2 else pull * (1 - 3 * q[2] * q[2] / squared)
+
+    def body_radius(self) -> float:
+        return self.radius
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ import numpy as np
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
+from dmoc.parts.rows import with_symbols
 from dmoc.scene.problem import TransferProblem
-from dmoc.scene.rows import with_symbols
 
 
 @dataclass(frozen=True)

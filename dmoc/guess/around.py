@@ -10,11 +10,7 @@ import numpy as np
 from dmoc.guess.coast import (
     LEAST_SAMPLES,
     MANY_TURNS,
-    attractors_of,
-    center_of,
     coast,
-    lone_attractor,
-    orbital_rates,
 )
 from dmoc.guess.open_ends import spiral_between, velocity_change_between, windings_between
 from dmoc.motion.dynamics import Dynamics
@@ -53,7 +49,7 @@ def shortest_flyable(problem: TransferProblem, states: Callable[[float], Any], a
 
 def _turn_rate(problem: TransferProblem, states: Any) -> float:
     """Revolutions a second on a circle through the outer one of two places."""
-    rates = orbital_rates(problem, np.stack([position for position, _ in states]))
+    rates = problem.attraction.rates(np.stack([position for position, _ in states]))
     return float(rates.min() / (2 * np.pi))
 
 
@@ -106,17 +102,17 @@ def _needed(problem: TransferProblem, path: np.ndarray, times: np.ndarray, state
 def _coasts(problem: TransferProblem, duration: float, states: Any) -> Path:
     """Coast arcs from both ends, blended; a straight line where one of them falls into an attractor."""
     (q0, v0), (q1, v1) = states
-    attractors = attractors_of(problem)
-    turns = duration * orbital_rates(problem, np.stack([q0, q1])).max()
+    attractors = problem.attraction.sources
+    turns = duration * problem.attraction.rates(np.stack([q0, q1])).max()
     sample = np.linspace(0.0, 1.0, int(np.clip(20 * turns, LEAST_SAMPLES, MOST_SAMPLES)))
     forward = coast(problem, 0.0, duration, (q0, v0), len(sample))
     backward = coast(problem, duration, 0.0, (q1, v1), len(sample))
     if forward is None or backward is None:
         return lambda at: _keep_clear(q0 + at[:, None] * (q1 - q0), attractors, q0, q1)
     arcs = [forward[:, : problem.dimension], backward[::-1, : problem.dimension]]
-    lone = lone_attractor(problem)
+    lone = problem.attraction.lone
     if lone is not None:
-        center = center_of(lone, problem.dimension)
+        center = lone.place(problem.dimension)
         from_center = ((q0 - center, v0), (q1 - center, v1))
         path = center + _blend_around(sample, arcs[0] - center, arcs[1] - center, from_center)
     else:
@@ -172,7 +168,7 @@ def _orbit_frame(states) -> np.ndarray:
 def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
     """Push nodes out of the neighbourhood of attractors, where no scheme can start."""
     for attractor in attractors:
-        center = center_of(attractor, len(q0))
+        center = attractor.place(len(q0))
         offset = path - center
         distance = np.linalg.norm(offset, axis=1, keepdims=True)
         least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))

@@ -11,8 +11,6 @@ import numpy as np
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
 from dmoc.effects.base import Conservative
-from dmoc.effects.frames import RotatingFrame
-from dmoc.effects.gravity import PointGravity
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 
@@ -20,32 +18,6 @@ from dmoc.scene.problem import TransferProblem
 LEAST_SAMPLES = 2000
 # From so many revolutions on a path between two states winds evenly around the attractor.
 MANY_TURNS = 3
-
-
-def attractors_of(problem: TransferProblem) -> list[PointGravity]:
-    return [effect for effect in problem.effects if isinstance(effect, PointGravity)]
-
-
-def lone_attractor(problem: TransferProblem) -> PointGravity | None:
-    """The one attractor of a frame that does not turn, around which there are orbits."""
-    attractors = attractors_of(problem)
-    turning = any(isinstance(effect, RotatingFrame) for effect in problem.effects)
-    return attractors[0] if len(attractors) == 1 and not turning and problem.dimension > 1 else None
-
-
-def center_of(attractor: PointGravity, dimension: int) -> np.ndarray:
-    return np.zeros(dimension) if attractor.center is None else np.array(attractor.center)
-
-
-def orbital_rates(problem: TransferProblem, position: np.ndarray) -> np.ndarray:
-    """Rate of a circular orbit around all attractors, sqrt(sum mu / r^3) [1/s]; 0 without any."""
-    squares = np.zeros(len(position))
-    for attractor in attractors_of(problem):
-        distance = np.linalg.norm(position - center_of(attractor, problem.dimension), axis=1)
-        # a node in the attractor itself asks for no steps: it is refused by name
-        outside = distance > 1e-6 * distance.max()
-        squares[outside] += attractor.mu / distance[outside] ** 3
-    return np.sqrt(squares)
 
 
 def coast(
@@ -59,7 +31,7 @@ def coast(
     # without what resists: backward in time drag feeds the motion without bound
     conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
     dynamics = Dynamics.of(problem, conservative)
-    centers = tuple(tuple(center_of(attractor, problem.dimension)) for attractor in attractors_of(problem))
+    centers = tuple(tuple(attractor.place(problem.dimension)) for attractor in problem.attraction.sources)
     least = [0.02 * math.dist(state[0], center) for center in centers]
     march = remembered(partial(_march, dynamics, centers, samples), "coast", dynamics, samples)
     sizes = [float(np.abs(part).max()) or 1.0 for part in state]

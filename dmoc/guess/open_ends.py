@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.effects.gravity import PointGravity
-from dmoc.guess.coast import attractors_of, center_of, coast, lone_attractor
+from dmoc.effects.base import Attractor
+from dmoc.guess.coast import coast
 from dmoc.guess.spiral import MOST_BENT, Spiral
 from dmoc.guess.winding import Winding
 from dmoc.scene.ends import Boundary
@@ -31,7 +31,7 @@ def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.nd
     states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
     whole = [not np.isnan(state).any() for state in states]
     settled = [end.anchored and known for end, known in zip(ends, whole, strict=True)]
-    if attractors_of(problem) and any(whole) and not all(settled):
+    if problem.attraction.sources and any(whole) and not all(settled):
         known = (settled if any(settled) else whole).index(True)
         open_end = 1 - known
         states[open_end] = _carried(problem, states[known], times[known], ends[open_end], times[open_end])
@@ -40,7 +40,7 @@ def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.nd
 
 def velocity_change_between(problem: TransferProblem, states: Any) -> float:
     """About what many revolutions from one orbit to another take [m/s]; see `Spiral.velocity_change`."""
-    attractor = lone_attractor(problem)
+    attractor = problem.attraction.lone
     assert attractor is not None
     start, goal = _from_center(problem, attractor, states)
     return Spiral(attractor.mu, np.zeros(3), 1.0, start, goal).velocity_change
@@ -67,14 +67,14 @@ def windings_between(problem: TransferProblem, duration: float, states: Any, mor
     `more`. None where an end is open or the orbits are too different. A path is a function of the
     fractions of the duration.
     """
-    attractor = lone_attractor(problem)
+    attractor = problem.attraction.lone
     if attractor is None or not (problem.start.anchored and problem.goal.anchored):
         return []
     start, goal = _from_center(problem, attractor, states)
     spins = np.cross(*start), np.cross(*goal)
     if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
         return []
-    center = center_of(attractor, problem.dimension)
+    center = attractor.place(problem.dimension)
 
     def positions(winding: Winding, fractions: np.ndarray) -> np.ndarray:
         return winding.positions(fractions)[:, : problem.dimension] + center
@@ -90,21 +90,21 @@ def windings_between(problem: TransferProblem, duration: float, states: Any, mor
     return [(*winding, sure) for winding in found]
 
 
-def _from_center(problem: TransferProblem, attractor: PointGravity, states: Any) -> list[tuple]:
+def _from_center(problem: TransferProblem, attractor: Attractor, states: Any) -> list[tuple]:
     """Start and goal with three axes, from the attractor."""
-    center, fill = center_of(attractor, problem.dimension), np.zeros(3 - problem.dimension)
+    center, fill = attractor.place(problem.dimension), np.zeros(3 - problem.dimension)
     return [(np.append(q - center, fill), np.append(v, fill)) for q, v in states]
 
 
 def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: bool) -> Spiral | None:
-    attractor = lone_attractor(problem)
+    attractor = problem.attraction.lone
     if attractor is None:
         return None
     start, goal = _from_center(problem, attractor, states)
     if not (np.any(start[0]) and np.any(goal[0])):
         # in the attractor itself: refused, in words, when the effects are looked at
         return None
-    center = np.pad(center_of(attractor, problem.dimension), (0, 3 - problem.dimension))
+    center = np.pad(attractor.place(problem.dimension), (0, 3 - problem.dimension))
     spiral = Spiral(attractor.mu, center, duration, start, goal, from_goal)
     return spiral if spiral.eccentricity < MOST_ECCENTRIC else None
 
@@ -148,7 +148,7 @@ def _drift(problem: TransferProblem, begin: float, finish: float, state: tuple) 
 def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarray:
     """The velocity of a state as it would be at another place around the first attractor."""
     q, v = state
-    center = center_of(attractors_of(problem)[0], len(q))
+    center = problem.attraction.center
     q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
     up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
     turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))

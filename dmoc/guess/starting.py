@@ -10,18 +10,14 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.guess.around import path_around, shortest_flyable
-from dmoc.guess.coast import attractors_of, lone_attractor, orbital_rates
 from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes, uniform_mesh
 from dmoc.motion.momenta import legendre_momenta
 from dmoc.motion.path import DiscretePath
-from dmoc.scene.constraints import KeepOut
 from dmoc.scene.problem import TransferProblem
 
-# How near the centre of a keep-out zone a guess is pushed aside, and how far, in radii.
-CENTRAL, PUSH = 0.05, 0.3
 # Steps follow the motion where its rate around attractors varies more than this along the guess.
 UNEVEN, SAMPLES = 5.0, 1000
 # A guess is made at so many nodes, where these are as many a revolution, and interpolated on finer meshes.
@@ -55,11 +51,12 @@ def starting_guess(
         position = _given_path(problem, given, duration, fractions)
         ends = _end_states(problem, duration)[1::2]
         # a smooth path around an attractor is worth its forces, and through them its multipliers
-        spiral = callable(given) and lone_attractor(problem) is not None
+        spiral = callable(given) and problem.attraction.lone is not None
     if not np.isfinite(position).all():
         node = int(np.argmin(np.isfinite(position).all(axis=1)))
         raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
-    position = _past_centres(problem, position, fractions)
+    for constraint in problem.constraints:
+        position = constraint.off_centre(position, fractions)
     for end, place in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
@@ -83,13 +80,13 @@ def guess_on(
 
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
     """About the angle that a path turns through around all attractors [rad]."""
-    rates = orbital_rates(problem, guess.position)
+    rates = problem.attraction.rates(guess.position)
     return float(np.trapezoid(rates, guess.duration * guess.fractions))
 
 
 def is_uneven(problem: TransferProblem, guess: DiscretePath) -> bool:
     """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
-    rates = orbital_rates(problem, guess.position)
+    rates = problem.attraction.rates(guess.position)
     return bool(rates.max() > UNEVEN * rates.min())
 
 
@@ -98,7 +95,7 @@ def graded_guess(
 ) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
     fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
-    rates = orbital_rates(problem, fine.position)
+    rates = problem.attraction.rates(fine.position)
     angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
     mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
     return starting_guess(problem, mesh, order, hold, given)
@@ -144,7 +141,7 @@ def guess_duration(problem: TransferProblem) -> float:
         return middle
     q0, v0, q1, v1 = _end_states(problem, middle)
     acceleration = limit / problem.mass
-    if lone_attractor(problem) is not None and problem.start.anchored and problem.goal.anchored:
+    if problem.attraction.lone is not None and problem.start.anchored and problem.goal.anchored:
         return shortest_flyable(problem, partial(_ends_in_pairs, problem), acceleration)
     spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
     if spiral is not None:
@@ -193,34 +190,7 @@ def _ends_in_pairs(problem: TransferProblem, duration: float) -> tuple:
 def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
     """Positions, the velocities of both ends, and whether the path is worth its forces."""
     q0, v0, q1, v1 = _end_states(problem, duration)
-    if not attractors_of(problem):
+    if not problem.attraction.sources:
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
     path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
     return path, (v0, v1), worth
-
-
-def _past_centres(problem: TransferProblem, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-    """Push a guess aside where it runs through the centre of a keep-out zone.
-
-    There no side is nearer than the other, and every step of the optimiser keeps to the middle.
-    """
-    for zone in problem.constraints:
-        if not isinstance(zone, KeepOut) or problem.dimension == 1:
-            continue
-        offset = path - np.asarray(zone.center)
-        distance = np.linalg.norm(offset, axis=1)
-        node = int(np.clip(np.argmin(distance), 1, len(path) - 2))
-        along = path[node + 1] - path[node - 1]
-        along /= np.linalg.norm(along) or 1.0
-        aside = offset[node] - (offset[node] @ along) * along
-        if distance[node] > zone.radius or np.linalg.norm(aside) > CENTRAL * zone.radius:
-            continue
-        if np.linalg.norm(aside) <= 1e-6 * zone.radius:
-            # the axis that the path follows least, then the next one, are turned to stand across it
-            order = np.argsort(np.abs(along), kind="stable")
-            aside = np.zeros_like(along)
-            aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
-        near = np.maximum(0.0, 1 - (distance / (2 * zone.radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
-        push = PUSH * zone.radius * near / max(near[node], 1e-3)
-        path = path + push[:, None] * aside / np.linalg.norm(aside)
-    return path

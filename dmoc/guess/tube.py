@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.guess.coast import MANY_TURNS, center_of, lone_attractor
+from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
 from dmoc.motion.path import DiscretePath
-from dmoc.scene.constraints import Constraint
+from dmoc.parts.constraint import Constraint
 from dmoc.scene.problem import TransferProblem
 
 # Half the width of the tube over the distance from the attractor.
@@ -41,12 +41,12 @@ def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | 
     takes a thousand iterations to come back, or to another optimum. Of 16 guesses and meshes of `dionysus`
     5 converged within 300 iterations without the tube, all 12 that were tried with it in 80.
     """
-    attractor = lone_attractor(problem)
+    attractor = problem.attraction.lone
     if attractor is None or problem.constraints or problem.actuator.force_limit() is None:
         return None
     if angle_around(problem, guess) < 2 * math.pi * MANY_TURNS:
         return None
-    offset = guess.position - center_of(attractor, problem.dimension)
+    offset = guess.position - attractor.place(problem.dimension)
     width = WIDTH * np.linalg.norm(offset, axis=1, keepdims=True)
     return replace(problem, constraints=(_Tube(guess.position - width, guess.position + width),))
 

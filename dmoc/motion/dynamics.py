@@ -10,8 +10,8 @@ import casadi as ca
 
 from dmoc.basics.memory import remembered_property
 from dmoc.effects.base import Conservative, Effect, Force
-from dmoc.scene.actuator import Actuator
-from dmoc.scene.forces import FreeForce
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.forces import FreeForce
 
 
 @dataclass(frozen=True)

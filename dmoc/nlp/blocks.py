@@ -12,8 +12,8 @@ from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
 from dmoc.nlp.stencils import AXES, Stencil, formulas_of
+from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
-from dmoc.scene.rows import Row
 
 
 class Transcript:

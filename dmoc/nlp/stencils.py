@@ -22,8 +22,8 @@ from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.assembly import Kernel, kernel
+from dmoc.parts.rows import Row, with_symbols
 from dmoc.scene.problem import TransferProblem
-from dmoc.scene.rows import Row, with_symbols
 
 AXES = "xyz"
 ALL, FIRST, LAST = slice(None), slice(0, 1), slice(-1, None)

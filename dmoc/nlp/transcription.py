@@ -20,8 +20,8 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Assembly, assemble
 from dmoc.nlp.blocks import Transcript
 from dmoc.nlp.layout import Layout
+from dmoc.parts.rows import values_of
 from dmoc.scene.problem import TransferProblem
-from dmoc.scene.rows import values_of
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,9 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import path_of, whole_file
+from dmoc.parts.engines import Nozzles
+from dmoc.parts.objectives import Objective, Time
+from dmoc.parts.speed import SpeedLimit
 from dmoc.plots.ledger import draw_ledger
 from dmoc.plots.path import burning, draw_path, entries_once, is_wide
 from dmoc.plots.style import (
@@ -25,9 +28,6 @@ from dmoc.plots.style import (
     within_steps,
 )
 from dmoc.results.solution import Solution
-from dmoc.scene.constraints import SpeedLimit
-from dmoc.scene.engines import Nozzles
-from dmoc.scene.objectives import Objective, Time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.parts.engines import Engine, Nozzles
+from dmoc.parts.zones import KeepIn, KeepOut
 from dmoc.plots.scene import Corners, draw_scene, view_of
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
 from dmoc.results.solution import Solution
-from dmoc.scene.constraints import KeepIn, KeepOut
-from dmoc.scene.engines import Engine, Nozzles
 
 MOST_DOTS = 40
 ARROWS = 20

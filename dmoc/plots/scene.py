@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from dmoc.effects.gravity import J2, PointGravity
+from dmoc.parts.zones import ApproachCone, KeepIn, KeepOut
 from dmoc.plots.style import ATTRACTOR, DARK, FORBIDDEN
 from dmoc.results.solution import Solution
-from dmoc.scene.constraints import ApproachCone, KeepIn, KeepOut
 
 # How far beyond the path zones are shown, as a part of the extent.
 REACH = 0.5

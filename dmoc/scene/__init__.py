@@ -1,1 +1,1 @@
-"""What is asked: what pushes, what is minimised, what is forbidden, where it starts and ends."""
+"""Where a transfer starts and ends, and the problem that its parts make."""

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.scene.rows import Row
+from dmoc.parts.rows import Row
 
 ELEMENTS = ("a", "e", "i", "raan", "argp", "nu")
 

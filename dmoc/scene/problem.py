@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -12,12 +13,13 @@ import numpy as np
 from dmoc.basics.arguments import entries, number, short
 from dmoc.effects.base import Conservative, Effect
 from dmoc.effects.motion import evaluated
-from dmoc.scene.actuator import Actuator
-from dmoc.scene.constraints import Constraint
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.forces import FreeForce
+from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
+from dmoc.parts.rows import Row
+from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
-from dmoc.scene.forces import FreeForce
-from dmoc.scene.objectives import Effort, FinalMass, Objective, Time
-from dmoc.scene.rows import Row
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,11 @@ class TransferProblem:
     def dimension(self) -> int:
         """Number of axes, 1 to 3."""
         return self.start.dimension
+
+    @cached_property
+    def attraction(self) -> Attraction:
+        """What attracts in the scene."""
+        return Attraction.of(self.effects, self.dimension)
 
     @property
     def adjustable_parts(self) -> tuple:

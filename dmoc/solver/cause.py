@@ -12,9 +12,10 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation, Relaxed
 from dmoc.nlp.ipopt import make_solver, path_of, run
 from dmoc.nlp.transcription import NLP, transcribe_onto, units_of
-from dmoc.scene.constraints import KeepOut, SpeedLimit
-from dmoc.scene.forces import BallForce, BoxForce, FreeForce
-from dmoc.scene.objectives import Effort
+from dmoc.parts.forces import BallForce, BoxForce, FreeForce
+from dmoc.parts.objectives import Effort
+from dmoc.parts.speed import SpeedLimit
+from dmoc.parts.zones import KeepOut
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.needs import down, force_words, speed_limit, times, times_of_limit, up
 

@@ -13,7 +13,9 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
 from dmoc.nlp.transcription import NLP
-from dmoc.scene.constraints import Constraint, KeepOut, SpeedLimit
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.speed import SpeedLimit
+from dmoc.parts.zones import KeepOut
 from dmoc.scene.problem import TransferProblem
 
 # Rows that are told of, and the scaled violation from which one is.

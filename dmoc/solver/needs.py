@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.scene.constraints import SpeedLimit
-from dmoc.scene.forces import BallForce, BoxForce
+from dmoc.parts.forces import BallForce, BoxForce
+from dmoc.parts.speed import SpeedLimit
 from dmoc.scene.problem import TransferProblem
 
 

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.coast import center_of, lone_attractor
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import check_mesh
-from dmoc.scene.constraints import KeepOut
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import COARSEST_NODES, Climb
 from dmoc.solver.solve import first_guess
@@ -83,9 +81,9 @@ def _add(found: list[Optimum], new: Optimum) -> None:
 def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
     """Names and guesses, without end."""
     yield "default", base
-    lone = lone_attractor(problem)
+    lone = problem.attraction.lone
     if lone is not None and problem.dimension > 1:
-        center = center_of(lone, problem.dimension)
+        center = lone.place(problem.dimension)
         ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
         for turns in (1, -1, 2, -2):
             windings = windings_between(problem, base.duration, ends, turns)
@@ -93,12 +91,8 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
             position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
     for i, constraint in enumerate(problem.constraints):
-        if isinstance(constraint, KeepOut):
-            for side, bend in _around(base, np.array(constraint.center), constraint.radius):
-                yield (
-                    f"{side} of {type(constraint).__name__} {i + 1}",
-                    replace(base, position=base.position + bend),
-                )
+        for way, bend in constraint.ways_round(base.position, base.fractions):
+            yield f"{way} of {type(constraint).__name__} {i + 1}", replace(base, position=base.position + bend)
     draw = np.random.default_rng(0)
     extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0
     number = 0
@@ -119,21 +113,3 @@ def _turned(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
     along = normal * (padded @ normal)[:, None]
     turned = np.cos(angle) * padded + np.sin(angle) * np.cross(normal, padded) + (1 - np.cos(angle)) * along
     return turned[:, : offset.shape[1]]
-
-
-def _around(base: DiscretePath, center: np.ndarray, radius: float) -> Iterator[tuple[str, np.ndarray]]:
-    """Bends of a path, zero at its ends, that take it past a zone on either side of it."""
-    nearest = int(np.argmin(np.linalg.norm(base.position - center, axis=1)))
-    nearest = min(max(nearest, 1), len(base.position) - 2)
-    along = base.position[nearest + 1] - base.position[nearest - 1]
-    along = along / (np.linalg.norm(along) or 1.0)
-    across = np.eye(len(center)) - np.outer(along, along)
-    sides = [side / np.linalg.norm(side) for side in across if np.linalg.norm(side) > 0.5]
-    peak = base.fractions[nearest]
-    shape = np.where(base.fractions < peak, base.fractions / peak, (1 - base.fractions) / (1 - peak))
-    shape = np.sin(0.5 * np.pi * shape)[:, None]
-    gap = base.position[nearest] - center
-    for i, direction in enumerate(sides):
-        for sign in (1, -1):
-            reach = sign * 1.5 * radius * direction - gap
-            yield f"{'+' if sign > 0 else '-'}{i + 1} side", shape * (reach - along * (reach @ along))

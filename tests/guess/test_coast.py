@@ -98,7 +98,7 @@ def test_a_spiral_without_angular_momentum_is_nowhere(capfd):
 
 
 @pytest.mark.parametrize(
-    "function, root",
+    "function, place",
     [
         (lambda x: x**3 - 0.2, 0.2 ** (1 / 3)),
         (lambda x: np.expm1(30 * (x - 0.9)), 0.9),
@@ -107,10 +107,10 @@ def test_a_spiral_without_angular_momentum_is_nowhere(capfd):
         (lambda x: -np.sign(x) * abs(x) ** 0.2, 0.0),
     ],
 )
-def test_the_root_between_two_places(function, root):
+def test_the_root_between_two_places(function, place):
     calls = []
     found = root(lambda x: calls.append(x) or function(x), -1.0, 1.0, 1e-6)
-    assert found == pytest.approx(root, abs=1e-6)
+    assert found == pytest.approx(place, abs=1e-6)
     assert len(calls) < 60
 
 

@@ -23,7 +23,7 @@ from dmoc import (
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.ipopt import make_solver, run
-from dmoc.scene.rows import values_of, with_symbols
+from dmoc.parts.rows import values_of, with_symbols
 
 MU, CENTER = 1.7, (0.3, -0.2, 0.5)
 VALUES = {"a": 1.3, "e": 0.3, "i": 0.7, "raan": 1.1, "argp": 2.3, "nu": 0.6}

@@ -1,47 +1,20 @@
-"""What is forbidden on the way."""
+"""Where the body must not be, or must stay."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, same_length, short, vector
-from dmoc.scene.rows import Row
-
-
-class Constraint(ABC):
-    """A limit on positions (`rows`, `bounds`) or on the speed (`speed_rows`) all along the path."""
-
-    unit: ClassVar[str] = "m"
-    adjustable: ClassVar[tuple[str, ...]] = ()
-
-    def check_dimension(self, dimension: int) -> None:
-        """Raise ValueError if the constraint has no meaning in this many dimensions."""
-
-    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
-        """Rows that hold at every node."""
-        return []
-
-    def speed_rows(self, v: Any) -> list[Row]:
-        """Rows that hold at the Gauss points of every step and at both ends."""
-        return []
-
-    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        """Plain bounds of the position [m]."""
-        limit = np.full(dimension, np.inf)
-        return -limit, limit
-
-    @abstractmethod
-    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """By how much states of shape (count, dimension) break the limit, in `unit`; 0 where it holds."""
-
-    @abstractmethod
-    def words(self) -> str:
-        """One line for a person."""
+from dmoc.basics.digits import down
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.detours import off_centre, ways_round
+from dmoc.parts.outline import Ball, Box, Cone, Shape
+from dmoc.parts.rows import Row
 
 
 @dataclass(frozen=True)
@@ -76,6 +49,28 @@ class KeepOut(Constraint):
 
     def words(self) -> str:
         return f"stays {self.radius:g} m away from {_point(self.center)}"
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
+
+    def eased(self, slack: float) -> KeepOut | None:
+        return replace(self, radius=self.radius * float(np.sqrt(1 - slack))) if slack < 1 else None
+
+    def needs(self, eased: Constraint, index: int, amount: str) -> str:
+        radius = down(eased.feature())
+        return f"keep-out {index} of at most {radius} m radius (you gave {self.radius:g} m)"
+
+    def outline(self) -> tuple[Shape, ...]:
+        return (Ball(np.array(self.center), self.radius),)
+
+    def feature(self) -> float:
+        return self.radius
+
+    def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+        return off_centre(path, fractions, np.asarray(self.center), self.radius)
+
+    def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        return ways_round(path, fractions, np.asarray(self.center), self.radius)
 
 
 @dataclass(frozen=True)
@@ -121,32 +116,8 @@ class KeepIn(Constraint):
     def words(self) -> str:
         return f"stays between {_point(self.lower)} and {_point(self.upper)}"
 
-
-@dataclass(frozen=True)
-class SpeedLimit(Constraint):
-    """Stay below a speed.
-
-    Parameters
-    ----------
-    limit : float
-        Largest speed [m/s].
-    """
-
-    limit: float
-    unit: ClassVar[str] = "m/s"
-    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", number("limit", self.limit, "m/s", positive=True))
-
-    def speed_rows(self, v: Any) -> list[Row]:
-        return [Row("speed", ca.dot(v, v) / self.limit**2, -np.inf, 1.0)]
-
-    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.maximum(0.0, np.linalg.norm(v, axis=1) - self.limit)
-
-    def words(self) -> str:
-        return f"is never faster than {self.limit:g} m/s"
+    def outline(self) -> tuple[Shape, ...]:
+        return (Box(np.array(self.lower), np.array(self.upper)),)
 
 
 @dataclass(frozen=True)
@@ -214,6 +185,9 @@ class ApproachCone(Constraint):
     def words(self) -> str:
         angle, axis = np.degrees(self.half_angle), _numbers(self.axis)
         return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {axis}"
+
+    def outline(self) -> tuple[Shape, ...]:
+        return (Cone(np.array(self.apex), np.array(self.axis), self.half_angle),)
 
 
 def _need(part: Any, argument: str, given: int, dimension: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from dmoc.basics.arguments import entries, number, short, vector, whole
-from dmoc.scene.actuator import Actuator
+from dmoc.parts.actuator import Actuator
 
 
 class Objective(ABC):

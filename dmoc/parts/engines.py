@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, limits, number, short, vector
-from dmoc.scene.actuator import Actuator
-from dmoc.scene.rows import Row
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.rows import Row
 
 STANDARD_GRAVITY = 9.80665
 
@@ -20,6 +20,11 @@ class _Burner(Actuator):
 
     exhaust_velocity: float | None
     dry_mass: float
+    coasts = True
+
+    @property
+    def limit_words(self) -> str:
+        return "largest thrust"
 
     @property
     def structure(self) -> tuple:
@@ -131,6 +136,11 @@ class Engine(_Burner):
     def force_limit(self) -> float:
         return self.max_thrust
 
+    def times(self, factor: float) -> Engine:
+        box = self.box if self.box is None else tuple(factor * np.atleast_1d(self.box))
+        box = box[0] if box is not None and not isinstance(self.box, tuple) else box
+        return replace(self, max_thrust=factor * self.max_thrust, box=box)
+
     def excess(self, u: np.ndarray) -> np.ndarray:
         thrust = np.linalg.norm(u[:, :-1], axis=1)
         over = np.maximum(thrust - self.max_thrust, self.min_thrust - u[:, -1])
@@ -162,6 +172,7 @@ class Nozzles(_Burner):
     specific_impulse: float | None = None
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
+    limit_label = "limit of\na nozzle"
 
     def __post_init__(self) -> None:
         rows = [vector(f"directions[{i}]", row, "-") for i, row in enumerate(entries(self.directions) or ())]
@@ -214,6 +225,9 @@ class Nozzles(_Burner):
 
     def force_limit(self) -> float:
         return float(np.max(self.max_thrust))
+
+    def times(self, factor: float) -> Nozzles:
+        return replace(self, max_thrust=tuple(factor * thrust for thrust in self.max_thrust))  # type: ignore[union-attr]
 
     def words(self) -> str:
         return (

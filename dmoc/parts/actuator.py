@@ -7,20 +7,36 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dmoc.scene.rows import Row
+from dmoc.basics.digits import up
+from dmoc.parts.rows import Row
 
 
 class Actuator(ABC):
     """Controls u of one node and the force they make. A force actuator's controls are its force [N].
 
-    Fields named in `adjustable` may change from one solve to the next without a rebuild; inside
-    `force` and `rows` they may be symbols.
+    A frozen dataclass that derives from this has these duties, each with a default that suits a free force:
+
+    1. Say how many controls a node has, what they are called and in which unit: `size`, `labels`, `units`.
+    2. Make the force of them: `force`.
+    3. State the limits for the optimiser: plain `bounds`, and `rows` for those that are none.
+    4. Say by how much given controls break the limits: `excess`. The checks rest on it.
+    5. Where it burns propellant or costs fuel: `throttle`, `flow`, `burns`, `metered`.
+    6. Name its limit and how it gives way: `force_limit`, `times`, `eased`, `needs`, `violation`.
+    7. Say in words what it is: `words`.
+
+    Not its business: meshes, units, where the body goes. Fields named in `adjustable` may change from one
+    solve to the next without a rebuild; inside `force` and `rows` they may be symbols.
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
-    # least mass [kg], and the rounding of |F| at zero where a throttle is tied to it [-]
+    # The mass cannot fall below this [kg].
     dry_mass: float = 0.0
+    # A throttle that is tied to |F| rounds it at zero over this part of the largest thrust [-].
     smoothing: float | None = None
+    # Whether it coasts as a rule, so that pictures show when it is on.
+    coasts: ClassVar[bool] = False
+    # What a picture calls the line at the force limit.
+    limit_label: ClassVar[str] = "limit"
 
     @property
     def structure(self) -> tuple:
@@ -83,6 +99,36 @@ class Actuator(ABC):
         """By how much the controls, shape (count, size), break the limits [N]; 0 where they hold."""
         lower, upper = self.bounds(u.shape[1])
         return np.maximum(0.0, np.maximum(lower - u, u - upper)).max(axis=1, initial=0.0)
+
+    def times(self, factor: float) -> Actuator:
+        """The same actuator with limits so many times as large."""
+        return self
+
+    def eased(self, slack: float) -> Actuator:
+        """The actuator with limits as large as rows and bounds need that lack `slack` of the limit."""
+        return self.times(1 + slack)
+
+    def needs(self, eased: Actuator) -> str:
+        """The limit that is enough, in words, beside the one given."""
+        enough = up(eased.force_limit() or 0.0)
+        return f"a {self.limit_words} of {enough} N (you gave {self.force_limit():g} N)"
+
+    @property
+    def limit_words(self) -> str:
+        """What its limit is called."""
+        return "force limit"
+
+    def unlimited(self) -> Actuator | None:
+        """The same controls without any limit, if these are a force; None for what is no free force."""
+        return None
+
+    def share(self, u: np.ndarray) -> float:
+        """How many times its limit the largest of some controls is, shape (count, size)."""
+        return float(np.abs(u).max(initial=0.0)) / (self.force_limit() or np.inf)
+
+    def violation(self, row: str, value: float) -> tuple[float, str]:
+        """Size and unit of a row's violation for a person, from its size as the row states it."""
+        return value * (self.force_limit() or 1.0), "N"
 
     def words(self) -> str:
         """One line for a person."""

@@ -9,9 +9,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import limits
-from dmoc.scene.actuator import Actuator
-from dmoc.scene.engines import Engine
-from dmoc.scene.rows import Row
+from dmoc.basics.digits import up
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.engines import Engine
+from dmoc.parts.rows import Row
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,23 @@ class BoxForce(Actuator):
     def force_limit(self) -> float:
         return float(np.max(self.limit))
 
+    def times(self, factor: float) -> BoxForce:
+        return BoxForce(_each(self.limit, factor))
+
+    def needs(self, eased: Actuator) -> str:
+        if not isinstance(self.limit, tuple):
+            return super().needs(eased)
+        factor = (eased.force_limit() or 0.0) / self.force_limit()
+        needed = ", ".join(up(limit * factor) for limit in self.limit)
+        given = ", ".join(f"{limit:g}" for limit in self.limit)
+        return f"force limits of ({needed}) N (you gave ({given}) N)"
+
+    def unlimited(self) -> Actuator:
+        return FreeForce()
+
+    def share(self, u: np.ndarray) -> float:
+        return float((np.abs(u) / np.asarray(self.limit)).max())
+
     def words(self) -> str:
         return f"a force with each component within {self.limit} N"
 
@@ -86,8 +104,28 @@ class BallForce(Actuator):
     def force_limit(self) -> float:
         return self.limit
 
+    def times(self, factor: float) -> BallForce:
+        return BallForce(factor * self.limit)
+
+    def eased(self, slack: float) -> BallForce:
+        # The row is the square of the share of the limit.
+        return self.times(float(np.sqrt(1 + slack)))
+
+    def unlimited(self) -> Actuator:
+        return FreeForce()
+
+    def share(self, u: np.ndarray) -> float:
+        return float(np.linalg.norm(u, axis=1).max()) / self.limit
+
+    def violation(self, row: str, value: float) -> tuple[float, str]:
+        return self.limit * (np.sqrt(1 + value) - 1), "N"
+
     def excess(self, u: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, np.linalg.norm(u, axis=1) - self.limit)
 
     def words(self) -> str:
         return f"a force in any direction of at most {self.limit:g} N"
+
+
+def _each(limit: float | tuple, factor: float) -> float | tuple:
+    return tuple(factor * one for one in limit) if isinstance(limit, tuple) else factor * limit

@@ -1,0 +1,118 @@
+"""The base of what is forbidden on the way."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dmoc.parts.outline import Shape
+from dmoc.parts.rows import Row
+
+
+class Constraint(ABC):
+    """A limit on positions or on the speed all along the path.
+
+    A frozen dataclass that derives from this has these duties:
+
+    1. State the limit for the optimiser, in at least one of three ways: `rows` that hold at every node,
+       `speed_rows` that hold at the Gauss points of every step and at both ends, or plain `bounds` of the
+       position.
+    2. Say by how much given states break it, in `unit`: `excess`. The checks and the refusal of ends that
+       break a constraint rest on it, so it must not be made from `rows`.
+    3. Say in words what it asks: `words`.
+
+    What follows has a default, and better answers make better messages, pictures and guesses:
+
+    4. `violation`: what the violation of a row means in the problem's own units.
+    5. `eased` and `needs`: how loose the limit would have to be, and how to say so.
+    6. `outline`: its shape in a picture; without one, a picture in the plane shows where `excess` is positive.
+    7. `ways_round` and `off_centre`: how a starting path gets past it.
+    8. `feature`: the size of the smallest thing that a path must not step over.
+
+    Not its business: meshes, units, scaling and multipliers. `q`, `v` are CasADi columns of the problem's
+    dimension, `u` the controls of the node or None where they are held, and fields named in `adjustable`,
+    which may change from one solve to the next without a rebuild, may be symbols inside `rows`.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Ceiling(Constraint):
+    ...     height: float
+    ...     def rows(self, t, q, u, m):
+    ...         return [Row("height", q[-1], -np.inf, self.height, "m")]
+    ...     def excess(self, q, v):
+    ...         return np.maximum(0.0, q[:, -1] - self.height)
+    ...     def words(self):
+    ...         return f"stays below {self.height:g} m"
+    """
+
+    unit: ClassVar[str] = "m"
+    adjustable: ClassVar[tuple[str, ...]] = ()
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the constraint has no meaning in this many dimensions."""
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        """Rows that hold at every node."""
+        return []
+
+    def speed_rows(self, v: Any) -> list[Row]:
+        """Rows that hold at the Gauss points of every step and at both ends."""
+        return []
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        """Plain bounds of the position [m]."""
+        limit = np.full(dimension, np.inf)
+        return -limit, limit
+
+    @abstractmethod
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """By how much states of shape (count, dimension) break the limit, in `unit`; 0 where it holds."""
+
+    @abstractmethod
+    def words(self) -> str:
+        """One line for a person: what the body does to keep it, as in "stays below 3 m"."""
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        """Size and unit of a row's violation for a person, from its size as the row states it."""
+        return value, unit or "-"
+
+    @property
+    def limits_speed(self) -> bool:
+        """Whether it is a limit on the speed, which a longer duration eases."""
+        return self.unit == "m/s"
+
+    def largest_speed(self) -> float | None:
+        """The speed that must not be exceeded [m/s]; None if it does not limit the speed."""
+        return None
+
+    def times(self, factor: float) -> Constraint:
+        """The same constraint with a limit on the speed so many times as large."""
+        return self
+
+    def eased(self, slack: float) -> Constraint | None:
+        """The constraint as loose as rows need that lack `slack`; None if it cannot be as loose as that."""
+        return self
+
+    def needs(self, eased: Constraint, index: int, amount: str) -> str:
+        """What would be enough, in words; `amount` says by how much the rows give way, with its unit."""
+        return f"constraint {index}, {type(self).__name__}, to give way by {amount}"
+
+    def outline(self) -> tuple[Shape, ...]:
+        """Its shapes in a picture."""
+        return ()
+
+    def feature(self) -> float:
+        """Size of the smallest thing that a path must not step over [m]; infinite if there is none."""
+        return np.inf
+
+    def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+        """A path, shape (nodes, dimension) [m], moved off places where no way round it is the nearer one."""
+        return path
+
+    def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """Names of the ways past it, each with the bend of the path that leads there, zero at its ends [m]."""
+        return iter(())

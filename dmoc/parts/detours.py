@@ -1,0 +1,61 @@
+"""How a starting path gets past a ball that is in its way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+# A path that passes the centre within this part of the radius is pushed aside.
+CENTRAL = 0.05
+# It is pushed by this part of the radius: enough for the optimiser to see which side is nearer.
+PUSH = 0.3
+# A detour passes the centre at this many radii.
+CLEARANCE = 1.5
+
+
+def off_centre(path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
+    """Push a path aside where it runs through the centre of a ball.
+
+    There no side is nearer than the other, and every step of the optimiser keeps to the middle.
+    """
+    if path.shape[1] == 1:
+        return path
+    offset = path - center
+    distance = np.linalg.norm(offset, axis=1)
+    node, along = _passing(path, int(np.argmin(distance)))
+    aside = offset[node] - (offset[node] @ along) * along
+    if distance[node] > radius or np.linalg.norm(aside) > CENTRAL * radius:
+        return path
+    if np.linalg.norm(aside) <= 1e-6 * radius:
+        # A direction across the path: the axis that it follows least, turned against the one it follows most.
+        order = np.argsort(np.abs(along), kind="stable")
+        aside = np.zeros_like(along)
+        aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
+    near = np.maximum(0.0, 1 - (distance / (2 * radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
+    push = PUSH * radius * near / max(near[node], 1e-3)
+    return path + push[:, None] * aside / np.linalg.norm(aside)
+
+
+def ways_round(
+    path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radius: float
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Bends of a path, zero at its ends, that take it past a ball on either side of it."""
+    node, along = _passing(path, int(np.argmin(np.linalg.norm(path - center, axis=1))))
+    across = np.eye(len(center)) - np.outer(along, along)
+    sides = [side / np.linalg.norm(side) for side in across if np.linalg.norm(side) > 0.5]
+    peak = fractions[node]
+    shape = np.where(fractions < peak, fractions / peak, (1 - fractions) / (1 - peak))
+    shape = np.sin(0.5 * np.pi * shape)[:, None]
+    gap = path[node] - center
+    for i, direction in enumerate(sides):
+        for sign in (1, -1):
+            reach = sign * CLEARANCE * radius * direction - gap
+            yield f"{'+' if sign > 0 else '-'}{i + 1} side", shape * (reach - along * (reach @ along))
+
+
+def _passing(path: np.ndarray, nearest: int) -> tuple[int, np.ndarray]:
+    """An inner node next to the nearest one, and the direction of the path there."""
+    node = min(max(nearest, 1), len(path) - 2)
+    along = path[node + 1] - path[node - 1]
+    return node, along / (np.linalg.norm(along) or 1.0)

@@ -1,0 +1,35 @@
+"""Shapes that a constraint can have in a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere, or a disc in the plane, that is forbidden: centre and radius [m]."""
+
+    center: np.ndarray
+    radius: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box to stay in: opposite corners [m], infinite where it has no wall."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A cone to stay in: tip [m], unit vector into it [-], angle between axis and surface [rad]."""
+
+    apex: np.ndarray
+    axis: np.ndarray
+    half_angle: float
+
+
+Shape = Ball | Box | Cone

@@ -1,0 +1,56 @@
+"""A limit on the speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import number
+from dmoc.basics.digits import up
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.rows import Row
+
+
+@dataclass(frozen=True)
+class SpeedLimit(Constraint):
+    """Stay below a speed.
+
+    Parameters
+    ----------
+    limit : float
+        Largest speed [m/s].
+    """
+
+    limit: float
+    unit: ClassVar[str] = "m/s"
+    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", number("limit", self.limit, "m/s", positive=True))
+
+    def speed_rows(self, v: Any) -> list[Row]:
+        return [Row("speed", ca.dot(v, v) / self.limit**2, -np.inf, 1.0)]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, np.linalg.norm(v, axis=1) - self.limit)
+
+    def words(self) -> str:
+        return f"is never faster than {self.limit:g} m/s"
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        return self.limit * (np.sqrt(1 + value) - 1), "m/s"
+
+    def largest_speed(self) -> float:
+        return self.limit
+
+    def times(self, factor: float) -> SpeedLimit:
+        return replace(self, limit=factor * self.limit)
+
+    def eased(self, slack: float) -> SpeedLimit:
+        return self.times(float(np.sqrt(1 + slack)))
+
+    def needs(self, eased: Constraint, index: int, amount: str) -> str:
+        return f"a speed limit of {up(eased.largest_speed() or 0.0)} m/s (you gave {self.limit:g} m/s)"
