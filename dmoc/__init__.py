@@ -65,7 +65,8 @@ _HOMES = {
     "dmoc.solver.solve": ("solve",),
     "dmoc.studies.accuracy": ("Formulation", "work_precision"),
     "dmoc.sweeps.sweep": ("sweep",),
-    "dmoc.nlp.transcription": ("NLP", "transcribe"),
+    "dmoc.nlp.program": ("NLP",),
+    "dmoc.nlp.transcription": ("transcribe",),
     "dmoc.checks.verification": ("Report", "verify"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -29,7 +29,7 @@ from dmoc.effects import Force
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics, specific_lagrangian
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.nlp.transcription import units_of
+from dmoc.nlp.units import units_of
 from dmoc.studies.accuracy import Formulation
 
 

@@ -41,8 +41,8 @@ import dmoc.basics.memory
 from dmoc import BallForce, PointGravity, State, TransferProblem, solve, verify
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.nlp.ipopt import make_solver, path_of, run
-from dmoc.nlp.transcription import transcribe_onto, units_of
+from dmoc.nlp.transcription import transcribe_onto
+from dmoc.nlp.units import units_of
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
@@ -111,13 +111,13 @@ def resolve(name: str, change: Any, steps: int = 400, repeats: int = 7) -> dict[
     changed = change(problem)
     known = solve(problem, steps=steps).raise_for_status().path
     nlp = transcribe_onto(problem, known, units_of(problem, known))
-    solver = make_solver(nlp, warm=True)
+    solver = nlp.solver(warm=True)
     times: dict[str, list[float]] = {"dmoc": [], "plain": []}
     for _ in range(repeats):
         begun = time.perf_counter()
         nlp.accepts(changed)
-        answer = run(solver, nlp, changed, known)
-        path_of(nlp, changed, answer)
+        answer = nlp.run(solver, changed, known)
+        nlp.path(changed, answer)
         times["dmoc"].append(time.perf_counter() - begun)
         (theirs,) = work_precision(changed, (), (steps,), 1, {"plain": METHODS["plain"]}, 1.0)
         times["plain"].append(theirs.seconds)

@@ -29,7 +29,7 @@ from dmoc import (
     solve,
 )
 from dmoc.basics.memory import forget
-from dmoc.nlp.stencils import formulas_of
+from dmoc.nlp.stencils import stencils_of
 from dmoc.scene.problem_file import load_problem
 
 README = Path(__file__).parents[1] / "README.md"
@@ -67,7 +67,7 @@ def instructions(problem: TransferProblem, order: int) -> dict[str, int]:
     """CasADi instructions of one step and of the nodes that are new with it."""
     times = {"node": order // 2, "step": 1, "ends": 0}
     counts = dict.fromkeys(FUNCTIONS, 0)
-    for stencil in formulas_of(problem, order, False).stencils:
+    for stencil in stencils_of(problem, order, False).stencils:
         for name, parts in FUNCTIONS.items():
             functions = stencil.kernel.functions
             counts[name] += times[stencil.every] * sum(functions[part].n_instructions() for part in parts)

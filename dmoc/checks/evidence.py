@@ -113,8 +113,7 @@ class Case:
     @cached_property
     def extent(self) -> float:
         """Diagonal of the box around the path [m]; of a body that stays, a billionth of where it could be."""
-        extent = float(np.linalg.norm(np.ptp(self.position, axis=0)))
-        return max(extent, 1e-9 * self.acceleration * self.path.duration**2) or 1.0
+        return max(self.path.diagonal, 1e-9 * self.acceleration * self.path.duration**2) or 1.0
 
     @cached_property
     def speed(self) -> float:

@@ -9,9 +9,10 @@ import numpy as np
 
 from dmoc.checks.evidence import Case
 from dmoc.motion.mesh import node_weights
-from dmoc.nlp.blocks import Transcript
-from dmoc.nlp.ipopt import scaled_multipliers
-from dmoc.nlp.transcription import NLP, units_of
+from dmoc.nlp.placement import Placement
+from dmoc.nlp.program import NLP
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import units_of
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def stationarity(case: Case) -> Stationarity:
     Evaluated block by block, without the sparse derivatives that a solve needs.
     """
     nlp, blocks = _unassembled(case)
-    lam_x, lam_g = scaled_multipliers(nlp, case.path)
+    lam_x, lam_g = nlp.multipliers(case.path)
     x, p = nlp.pack(case.path), nlp.parameters(case.problem)
     lbx, ubx, lbg, ubg = nlp.bounds(case.problem)
     slope, rows, cost = _evaluate(blocks, nlp, x, p, lam_g)
@@ -83,7 +84,9 @@ def _unassembled(case: Case) -> tuple[NLP, list]:
     if case.largest < case.typical_force:
         path = replace(path, control=np.full_like(path.control, case.typical_force))
     units = units_of(problem, path)
-    script = Transcript(problem, case.rule, path.hold, path.mesh, units)
+    script = Placement(
+        problem, stencils_of(problem, path.order, path.hold), case.rule, path.hold, path.mesh, units
+    )
     derivatives: Any = None
     nlp = NLP(
         problem,

@@ -74,7 +74,7 @@ def show(problem: Name, settings: Settings = None) -> None:
     """Say what a problem is: the scene, its parameters, the size of its NLP."""
     from dmoc.nlp.transcription import transcribe
     from dmoc.reports import words as report
-    from dmoc.solver.solve import DEFAULT_STEPS
+    from dmoc.solver.meshes import DEFAULT_STEPS
 
     file, case = problem_of(problem, settings)
     nlp = transcribe(case, DEFAULT_STEPS[2])

@@ -27,7 +27,7 @@ from dmoc.exports.functions import Exported
 from dmoc.exports.planner import Planner
 from dmoc.motion.lobatto import scheme
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.solve import DEFAULT_STEPS
+from dmoc.solver.meshes import DEFAULT_STEPS
 
 FORMAT = "dmoc export"
 FORMAT_VERSION = 1

@@ -14,7 +14,7 @@ import numpy as np
 
 from dmoc.basics.docstrings import documented
 from dmoc.exports.functions import Term
-from dmoc.nlp.transcription import NLP
+from dmoc.nlp.program import NLP
 from dmoc.scene.problem import TransferProblem
 
 # Added to a number it leaves nothing of that number, and dividing by it loses no digit.

@@ -14,10 +14,12 @@ from dmoc.exports.numbers import Numbers
 from dmoc.exports.residual import path_symbols, residual_of, velocities_of
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import DiscretePath, Key
 from dmoc.motion.stability import refuse_unstable
-from dmoc.nlp.ipopt import Answer, make_solver, path_of
-from dmoc.nlp.transcription import NLP, check_mesh, transcribe_onto, units_of
+from dmoc.nlp.ipopt import Answer
+from dmoc.nlp.program import NLP
+from dmoc.nlp.transcription import check_mesh, transcribe_onto
+from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
 
 
@@ -46,9 +48,9 @@ class Planner:
         """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
         columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
         answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0, 0.0)
-        return self.by_name(path_of(self.nlp, self.scene.problem, answer).multipliers)
+        return self.by_name(self.nlp.path(self.scene.problem, answer).multipliers)
 
-    def by_name(self, multipliers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def by_name(self, multipliers: dict[Key, np.ndarray]) -> dict[str, np.ndarray]:
         """Multipliers of a path under the names they have here, one column an index."""
         names = {key: _multiplier_name(key, list(multipliers)) for key in multipliers}
         return {names[key]: value.T for key, value in multipliers.items() if value.size}
@@ -61,16 +63,15 @@ class Planner:
 
     def pack(self, plan: dict[str, Any]) -> ca.MX:
         """Scaled unknowns."""
-        parts = {
-            "position": lambda: plan["positions"] - ca.DM(self.nlp.units.origin),
-            "force": lambda: plan["forces"],
-            "mass": lambda: plan["masses"],
-            "start.velocity": lambda: plan["velocities"][:, 0],
-            "goal.velocity": lambda: plan["velocities"][:, -1],
-            "duration": lambda: plan["duration"],
+        values = {
+            "position": plan["positions"] - ca.DM(self.nlp.units.origin),
+            "force": plan["forces"],
+            "mass": plan.get("masses"),
+            "start.velocity": plan["velocities"][:, 0],
+            "goal.velocity": plan["velocities"][:, -1],
+            "duration": plan.get("duration"),
         }
-        values = [ca.vec(parts[group.name]()) for group in self.nlp.columns.groups]
-        return ca.vertcat(*values) / ca.DM(self.nlp.columns.scales())
+        return self.nlp.scaled(values, ca.vec, lambda parts: ca.vertcat(*parts))
 
     def unpack(self, x: ca.MX, numbers: dict[str, ca.MX]) -> dict[str, ca.MX]:
         """What the residual of a path is made of, from scaled unknowns."""
@@ -91,11 +92,10 @@ class Planner:
         }
 
 
-def _multiplier_name(key: str, keys: list[str]) -> str:
-    """multipliers_goal_speed from end:row:goal.speed; with its kind where two groups have one name."""
-    kind, _, name = key.split(":")
-    twins = [other for other in keys if other.split(":")[2] == name]
-    return f"multipliers_{name.replace('.', '_')}" + (f"_{kind}" if len(twins) > 1 else "")
+def _multiplier_name(key: Key, keys: list[Key]) -> str:
+    """multipliers_goal_speed for the group goal.speed; with its kind where two groups have one name."""
+    twins = [other for other in keys if other.group == key.group]
+    return f"multipliers_{key.group.replace('.', '_')}" + (f"_{key.kind}" if len(twins) > 1 else "")
 
 
 def cost(planner: Planner) -> Exported:
@@ -127,7 +127,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     lam_x, lam_g = ca.vertsplit(ca.vertcat(*lam), [0, nlp.columns.size, nlp.columns.size + nlp.rows.size])
     bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
     x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
-    found = make_solver(nlp, options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
+    found = nlp.solver(options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
     both = ca.vertcat(found["x"], found["g"])
     beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")

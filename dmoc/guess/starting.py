@@ -13,15 +13,10 @@ from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import node_fractions, node_weights, step_nodes, uniform_mesh
+from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
 from dmoc.motion.momenta import legendre_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
-
-# Steps follow the motion where its rate around attractors varies more than this along the guess.
-UNEVEN, SAMPLES = 5.0, 1000
-# A guess is made at so many nodes, where these are as many a revolution, and interpolated on finer meshes.
-GUESSED, NODES_A_TURN = 2000, 100
 
 
 def starting_guess(
@@ -66,39 +61,10 @@ def starting_guess(
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
-def guess_on(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
-) -> DiscretePath:
-    """A starting guess; on a mesh of many steps by way of fewer, where these follow its revolutions as well."""
-    fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
-    if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
-        found = starting_guess(problem, fewer, order, hold)
-        if angle_around(problem, found) < 2 * np.pi * GUESSED / NODES_A_TURN:
-            return found.onto(mesh, order, hold)
-    return starting_guess(problem, mesh, order, hold, given)
-
-
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
     """About the angle that a path turns through around all attractors [rad]."""
     rates = problem.attraction.rates(guess.position)
     return float(np.trapezoid(rates, guess.duration * guess.fractions))
-
-
-def is_uneven(problem: TransferProblem, guess: DiscretePath) -> bool:
-    """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
-    rates = problem.attraction.rates(guess.position)
-    return bool(rates.max() > UNEVEN * rates.min())
-
-
-def graded_guess(
-    problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
-) -> DiscretePath:
-    """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
-    fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
-    rates = problem.attraction.rates(fine.position)
-    angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
-    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
-    return starting_guess(problem, mesh, order, hold, given)
 
 
 def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:

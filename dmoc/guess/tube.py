@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import POSITION_BOUNDS, DiscretePath
 from dmoc.parts.constraint import Constraint
 from dmoc.scene.problem import TransferProblem
 
@@ -53,5 +53,5 @@ def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | 
 
 def out_of_tube(path: DiscretePath) -> DiscretePath:
     """An answer within a tube, to go on from without it."""
-    multipliers = {name: value for name, value in path.multipliers.items() if name != "node:column:position"}
+    multipliers = {key: value for key, value in path.multipliers.items() if key != POSITION_BOUNDS}
     return replace(path, multipliers=multipliers)

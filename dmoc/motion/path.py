@@ -3,12 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from dmoc.basics.numerics import cubic_spline
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
+
+
+class Key(NamedTuple):
+    """Which multipliers: what their index counts, of a "row" or a "column" (an unknown), of which group.
+
+    `kind` is as in the layout of the NLP: "smooth", "node", "control", "step", "between" or "end".
+    """
+
+    kind: str
+    side: str
+    group: str
+
+    def __str__(self) -> str:
+        return ":".join(self)
+
+    @classmethod
+    def parse(cls, text: str) -> Key:
+        """The key that a result file holds as text."""
+        return cls(*text.split(":", 2))
+
+
+# Multipliers of the discrete Euler-Lagrange equations: the costates.
+COSTATE = Key("smooth", "row", "dynamics")
+# Multipliers of the rows that tie an actuator's controls together, and of the bounds on positions.
+ACTUATOR_ROWS = Key("control", "row", "actuator")
+POSITION_BOUNDS = Key("node", "column", "position")
 
 
 @dataclass(frozen=True)
@@ -36,7 +63,12 @@ class DiscretePath:
     mass: np.ndarray
     start_velocity: np.ndarray
     goal_velocity: np.ndarray
-    multipliers: dict[str, np.ndarray] = field(default_factory=dict)
+    multipliers: dict[Key, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box around the path [m]."""
+        return float(np.linalg.norm(np.ptp(self.position, axis=0)))
 
     @property
     def fractions(self) -> np.ndarray:
@@ -69,12 +101,11 @@ class DiscretePath:
             position=position,
             control=_between(old_control, self.control, new_control),
             mass=np.interp(new, old, self.mass),
-            multipliers={name: _carry(name, value, places) for name, value in self.multipliers.items()},
+            multipliers={key: _carry(key.kind, value, places) for key, value in self.multipliers.items()},
         )
 
 
-def _carry(name: str, value: np.ndarray, places: dict) -> np.ndarray:
-    kind = name.split(":")[0]
+def _carry(kind: str, value: np.ndarray, places: dict) -> np.ndarray:
     if kind == "smooth":
         return cubic_spline(places["node"][0], value)(places["node"][1])
     return _between(places[kind][0], value, places[kind][1]) if kind in places else value
@@ -83,3 +114,12 @@ def _carry(name: str, value: np.ndarray, places: dict) -> np.ndarray:
 def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray:
     """Linear interpolation of every column: never beyond the values it is made from."""
     return np.stack([np.interp(new, old, column) for column in values.T], axis=1) if values.size else values
+
+
+def path_scales(path: DiscretePath) -> tuple[float, float]:
+    """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
+    extent = path.diagonal
+    ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
+    extent = extent or ends * path.duration or 1.0
+    length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
+    return extent, max(length / path.duration, ends) or extent / path.duration

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.transcription import NLP
+from dmoc.nlp.program import NLP
 from dmoc.scene.problem import TransferProblem
 
 # The effort's weight beside the slack: it makes the path unique, and moves the slack by about as much.

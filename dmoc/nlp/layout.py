@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+
+
+class Owner(NamedTuple):
+    """The part of a problem that states rows: a field of `TransferProblem` and which of its entries.
+
+    `end` is "start" or "goal" where the rows look at the boundary state there alone.
+    """
+
+    field: str
+    entry: int = 0
+    end: str = ""
+
+    def of(self, problem: Any) -> Any:
+        """The part itself."""
+        part = getattr(problem, self.field)
+        return part[self.entry] if self.field == "constraints" else part
 
 
 @dataclass(frozen=True)
@@ -12,7 +30,9 @@ class Group:
     """Neighbouring unknowns or rows of one kind: `count` times the components in `labels`.
 
     `kind` says what the index counts and how multipliers travel between meshes: "smooth" (nodes,
-    rows of the discrete Euler-Lagrange equations), "node", "control", "step" or "end" (counts nothing).
+    rows of the discrete Euler-Lagrange equations), "node", "control", "step", "between" (the mass flow of
+    neighbouring steps) or "end" (counts nothing). `owner` is the part that states the rows, `units` the unit
+    in which it states each.
     """
 
     name: str
@@ -21,6 +41,8 @@ class Group:
     count: int
     start: int
     scale: float | np.ndarray = 1.0
+    owner: Owner | None = None
+    units: tuple[str, ...] = ()
 
     @property
     def indices(self) -> np.ndarray:
@@ -57,8 +79,23 @@ class Layout:
 
     groups: tuple[Group, ...] = ()
 
-    def add(self, name: str, kind: str, labels, count: int, scale: float | np.ndarray = 1.0) -> Layout:
-        return Layout((*self.groups, Group(name, kind, tuple(labels), count, self.size, scale)))
+    def add(
+        self,
+        name: str,
+        kind: str,
+        labels: Sequence[str],
+        count: int,
+        scale: float | np.ndarray = 1.0,
+        owner: Owner | None = None,
+        units: Sequence[str] = (),
+    ) -> Layout:
+        """The layout with one more group behind the others."""
+        new = Group(name, kind, tuple(labels), count, self.size, scale, owner, tuple(units))
+        return Layout((*self.groups, new))
+
+    def group_at(self, place: int) -> Group:
+        """The group that an unknown or a row belongs to."""
+        return next(group for group in self.groups if place < group.stop)
 
     @property
     def size(self) -> int:
@@ -71,7 +108,7 @@ class Layout:
         return next(group for group in self.groups if group.name == name)
 
     def name_of(self, place: int) -> str:
-        return next(group for group in self.groups if place < group.stop).name_of(place)
+        return self.group_at(place).name_of(place)
 
     def scales(self) -> np.ndarray:
         """Scale of every place."""

@@ -2,18 +2,17 @@
 
 An effect that looks only at time, position and mass acts once a node, with the node's whole weight;
 one that looks at the velocity acts in every step with that step's own velocities. Either way the
-rows add up to the discrete Euler-Lagrange equations of `mechanics`. Nothing here depends on the
+rows add up to the discrete Euler-Lagrange equations of `dmoc.motion.step`. Nothing here depends on the
 mesh, on units or on numbers that may change from solve to solve: what was written down once serves
 every mesh, and every problem of the same structure.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -22,11 +21,21 @@ from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.assembly import Kernel, kernel
-from dmoc.parts.rows import Row, with_symbols
+from dmoc.nlp.layout import Owner
+from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
 AXES = "xyz"
 ALL, FIRST, LAST = slice(None), slice(0, 1), slice(-1, None)
+
+
+class Limit(NamedTuple):
+    """A group of rows of its own: name, what its index counts, the rows, the part that states them."""
+
+    name: str
+    kind: str
+    rows: tuple[Row, ...]
+    owner: Owner | None
 
 
 @dataclass(frozen=True)
@@ -34,7 +43,7 @@ class Stencil:
     """A kernel, and where its unknowns and rows stand on any mesh: (group, which of its entries).
 
     It is evaluated at `every` "node", "step" or at both "ends" once; `limits` are the groups of
-    rows that nothing else adds to, as (name, kind, rows).
+    rows that nothing else adds to.
     """
 
     kernel: Kernel
@@ -42,34 +51,34 @@ class Stencil:
     unknowns: tuple[tuple[str, slice], ...]
     numbers: tuple[str, ...]
     targets: tuple[tuple[str, slice], ...]
-    limits: tuple[tuple[str, str, tuple[Row, ...]], ...]
+    limits: tuple[Limit, ...]
 
 
-def formulas_of(problem: TransferProblem, order: int, hold: bool) -> Formulas:
-    """The formulas of a problem, written down once for all problems of the same structure."""
-    # their types beside the structure: a user's own may call its structure what it likes
+def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
+    """The stencils of a problem, written down once for all problems of the same structure."""
+    # The type belongs to the key: a user's part may call its structure what the library calls its own.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
-    # dmoc's own have their numbers as symbols or as bounds
+    # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [type(constraint) for constraint in problem.constraints]
     shape = problem.dimension, problem.free_duration, order, hold
     make = partial(_written, problem, scheme(order), hold)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
-def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Formulas:
-    draft = _Formulas(problem, rule, hold)
-    return Formulas((draft.node(), draft.step(), draft.ends()), draft.parameters.numel())
+def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Stencils:
+    writer = _Writer(problem, rule, hold)
+    return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
 
 
 @dataclass(frozen=True)
-class Formulas:
+class Stencils:
     """The stencils of one structure of problem at one order, and how many parameters they have."""
 
     stencils: tuple[Stencil, ...]
     parameter_count: int
 
 
-class _Formulas:
+class _Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
@@ -98,9 +107,9 @@ class _Formulas:
         push = push if u is None else push + self.actuator.force(u) / m
         draft.add("dynamics", duration * weight * (dldq + push))
         for i, constraint in enumerate(self.constraints):
-            draft.limit(_title(constraint, i), "node", constraint.rows(t, q, u, m))
+            draft.limit(title(constraint, i), "node", constraint.rows(t, q, u, m), Owner("constraints", i))
         if u is not None:
-            draft.limit("actuator", "control", self.actuator.rows(u))
+            draft.limit("actuator", "control", self.actuator.rows(u), Owner("actuator"))
         if not self._cost_in_steps():
             draft.cost = duration * weight * self._rate(t, q, ca.DM.zeros(n), u, m)
         return draft.stencil("node")
@@ -135,9 +144,9 @@ class _Formulas:
             rows = [
                 row._replace(name=str(g)) for g, v in enumerate(at_gauss) for row in constraint.speed_rows(v)
             ]
-            draft.limit(_title(constraint, i), "step", rows)
+            draft.limit(title(constraint, i), "step", rows, Owner("constraints", i))
         if self.hold:
-            draft.limit("actuator", "control", self.actuator.rows(u[0]))
+            draft.limit("actuator", "control", self.actuator.rows(u[0]), Owner("actuator"))
         if problem.actuator.burns:
             self._burn(draft, h, m, [self.actuator.flow(control) for control in u])
         if self._cost_in_steps():
@@ -191,9 +200,11 @@ class _Formulas:
         draft.add("dynamics", self.dynamics.point(*states["start"])[1], FIRST)
         draft.add("dynamics", -self.dynamics.point(*states["goal"])[1], LAST)
         for end, condition in (("start", self.start), ("goal", self.goal)):
-            draft.limit(f"{end}.condition", "end", condition.rows(*states[end]))
-            rows = [row for constraint in self.constraints for row in constraint.speed_rows(v[end])]
-            draft.limit(f"{end}.speed", "end", rows)
+            draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
+            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows(v[end]))]
+            for count, (i, rows) in enumerate(speed):
+                name = f"{end}.speed" + (f"_{count + 1}" if count else "")
+                draft.limit(name, "end", rows, Owner("constraints", i, end))
         draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*states["goal"]))
         return draft.stencil("ends")
 
@@ -211,15 +222,15 @@ class _Formulas:
 class _Draft:
     """The unknowns, numbers and rows of one stencil while it is being written down."""
 
-    def __init__(self, formulas: _Formulas):
-        self.formulas, self.cost = formulas, ca.SX(0)
+    def __init__(self, writer: _Writer):
+        self.writer, self.cost = writer, ca.SX(0)
         self._symbols: list[ca.SX] = []
         self._unknowns: list[tuple[str, slice]] = []
         self._data: list[ca.SX] = []
         self._numbers: list[str] = []
         self._rows: list[ca.SX] = []
         self._targets: list[tuple[str, slice]] = []
-        self._limits: list[tuple[str, str, tuple[Row, ...]]] = []
+        self._limits: list[Limit] = []
 
     def take(self, group: str, size: int, at: slice = ALL) -> ca.SX:
         """Symbols for some of the unknowns of a group."""
@@ -235,31 +246,27 @@ class _Draft:
 
     def mass(self, at: slice) -> ca.SX:
         """The mass at nodes: unknowns if it burns away, a parameter if not."""
-        return self.take("mass", 1, at) if self.formulas.problem.actuator.burns else self.formulas.mass
+        return self.take("mass", 1, at) if self.writer.problem.actuator.burns else self.writer.mass
 
     def duration(self) -> ca.SX:
         """The duration: an unknown if it is free, a parameter if not."""
-        return self.take("duration", 1) if self.formulas.problem.free_duration else self.formulas.duration
+        return self.take("duration", 1) if self.writer.problem.free_duration else self.writer.duration
 
     def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:
         """Add to rows of a group that others also add to."""
         self._rows.append(rows)
         self._targets.append((group, at))
 
-    def limit(self, name: str, kind: str, rows: Sequence[Row]) -> None:
+    def limit(self, name: str, kind: str, rows: Sequence[Row], owner: Owner | None = None) -> None:
         """Rows of this stencil alone."""
         if rows:
-            # the expressions are in the kernel
-            self._limits.append((name, kind, tuple(row._replace(expression=None) for row in rows)))
+            # The kernel holds the expressions.
+            bare = tuple(row._replace(expression=None) for row in rows)
+            self._limits.append(Limit(name, kind, bare, owner))
             self.add(name, ca.vertcat(*[row.expression for row in rows]))
 
     def stencil(self, every: str) -> Stencil:
-        given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.formulas.parameters
+        given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.writer.parameters
         made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
         places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)
         return Stencil(made, every, *places, tuple(self._limits))
-
-
-def _title(constraint: Any, index: int) -> str:
-    """KeepOut, second in the list: keep_out_2."""
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", type(constraint).__name__).lower() + f"_{index + 1}"

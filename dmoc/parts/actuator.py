@@ -126,7 +126,7 @@ class Actuator(ABC):
         """How many times its limit the largest of some controls is, shape (count, size)."""
         return float(np.abs(u).max(initial=0.0)) / (self.force_limit() or np.inf)
 
-    def violation(self, row: str, value: float) -> tuple[float, str]:
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
         """Size and unit of a row's violation for a person, from its size as the row states it."""
         return value * (self.force_limit() or 1.0), "N"
 

@@ -117,7 +117,7 @@ class BallForce(Actuator):
     def share(self, u: np.ndarray) -> float:
         return float(np.linalg.norm(u, axis=1).max()) / self.limit
 
-    def violation(self, row: str, value: float) -> tuple[float, str]:
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
         return self.limit * (np.sqrt(1 + value) - 1), "N"
 
     def excess(self, u: np.ndarray) -> np.ndarray:

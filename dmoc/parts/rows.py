@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -17,6 +18,16 @@ class Row(NamedTuple):
     lower: float
     upper: float
     unit: str = ""
+
+
+def title(part: Any, index: int) -> str:
+    """A name for rows and numbers of a part: KeepOut, second in the list, is keep_out_2."""
+    return f"{snake(type(part).__name__)}_{index + 1}"
+
+
+def snake(name: str) -> str:
+    """KeepOut: keep_out."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
 def with_symbols(part: Any, name: str) -> tuple[Any, list]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.effects.base import Effect
     from dmoc.motion.march import Trajectory
-    from dmoc.nlp.transcription import NLP
+    from dmoc.nlp.program import NLP
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
     from dmoc.scene.problem_file import Parameter

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import COSTATE, DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
@@ -107,7 +107,7 @@ class Solution:
 
     @property
     def costate(self) -> np.ndarray:
-        return self.path.multipliers["smooth:row:dynamics"]
+        return self.path.multipliers[COSTATE]
 
     @property
     def iterations(self) -> int:

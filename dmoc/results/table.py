@@ -23,7 +23,7 @@ import numpy as np
 
 from dmoc.basics.files import AGAIN
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import Format, Table, one_line, read_table, write_table
 
@@ -124,7 +124,7 @@ def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
         _array(table, "mass"),
         _array(table, "start_velocity"),
         _array(table, "goal_velocity"),
-        {str(table[name][2]["key"]): _array(table, name) for name in groups},
+        {Key.parse(str(table[name][2]["key"])): _array(table, name) for name in groups},
     )
 
 
@@ -207,15 +207,14 @@ def _text(value: Any) -> str:
 def _multipliers(solution: Any) -> Table:
     variables: Table = {}
     for key, values in solution.path.multipliers.items():
-        _, side, group = key.split(":", 2)
-        name = re.sub(r"\W+", "_", f"multiplier_{side}_{group}")
+        name = re.sub(r"\W+", "_", f"multiplier_{key.side}_{key.group}")
         while name in variables:
             name += "_"
-        unit = DUAL_UNITS.get(group.split(".")[-1] if side == "column" or group == "dynamics" else "")
+        unit = DUAL_UNITS.get(key.group.split(".")[-1] if key.side == "column" or key == COSTATE else "")
         cost = solution.provenance.objective_unit or "1"
-        attributes = {"units": f"{cost}/({unit})" if unit else cost, "key": key}
-        attributes["long_name"] = f"multiplier of {group}; of nodes and steps per fraction of the duration"
-        variables[name] = (_dimensions(solution, key.split(":")[0], values.shape), values, attributes)
+        attributes = {"units": f"{cost}/({unit})" if unit else cost, "key": str(key)}
+        attributes["long_name"] = f"multiplier of {key.group}; of nodes and steps per fraction of the duration"
+        variables[name] = (_dimensions(solution, key.kind, values.shape), values, attributes)
     return variables
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 
@@ -12,14 +10,13 @@ from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
-from dmoc.nlp.transcription import NLP
-from dmoc.parts.constraint import Constraint
-from dmoc.parts.speed import SpeedLimit
-from dmoc.parts.zones import KeepOut
+from dmoc.nlp.program import NLP
 from dmoc.scene.problem import TransferProblem
 
-# Rows that are told of, and the scaled violation from which one is.
-COUNT, SEEN = 10, 1e-9
+# At most this many rows and bounds are told of ...
+COUNT = 10
+# ... from this scaled violation on, which is above the round-off of a row that holds.
+SEEN = 1e-9
 
 
 def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess: DiscretePath) -> None:
@@ -110,71 +107,35 @@ def _listed(values: np.ndarray) -> str:
 
 def worst_in_units(nlp: NLP, problem: TransferProblem, x, g) -> tuple[tuple[str, float, str], ...]:
     """The ten most violated rows and bounds, worst scaled violation first: name, violation, unit."""
-    lbx, ubx, lbg, ubg = nlp.bounds(problem)
-    excess = [
-        np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)
-        for value, low, high in ((np.ravel(g), lbg, ubg), (np.ravel(x), lbx, ubx))
-    ]
-    both, rows = np.concatenate(excess), nlp.rows.size
     duration = nlp.unpack(x, problem).duration
     found = []
-    for place in np.argsort(-both)[:COUNT]:
-        if both[place] > SEEN:
-            layout, at = (nlp.rows, place) if place < rows else (nlp.columns, place - rows)
-            group = next(group for group in layout.groups if at < group.stop)
-            index, component = divmod(int(at) - group.start, len(group.labels))
-            scale = group.scales[index, component]
-            if place < rows:
-                size, unit = _row(nlp, problem, group, index, component, both[place] / scale, duration)
+    for group, place, scaled in nlp.violations(problem, x, g, COUNT):
+        if scaled > SEEN:
+            index, component = divmod(place - group.start, len(group.labels))
+            value = scaled * group.scales[index, component]
+            if group in nlp.rows.groups:
+                value = scaled / group.scales[index, component]
+                size, unit = _row(nlp, problem, group, index, component, value, duration)
             else:
-                size, unit = both[place] * scale, _unit_of_unknown(problem, group, component)
-            found.append((group.name_of(at), float(size), unit))
+                size, unit = value, _unit_of_unknown(problem, group, component)
+            found.append((group.name_of(place), float(size), unit))
     return tuple(found)
 
 
 def _row(
     nlp: NLP, problem: TransferProblem, group: Group, index: int, component: int, value: float, duration: float
-) -> tuple:
+) -> tuple[float, str]:
     """A violation of a row as the NLP states it, in words of the problem: size and unit."""
-    if group.name == "dynamics":
-        # a row is a momentum per mass; over the node's share of the time, a force
+    if group.owner is None and group.kind == "smooth":
+        # A row of motion is a momentum per mass; over the node's share of the time it is a force.
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
         return value * problem.mass / weight, "N"
-    if group.name.startswith("mass_"):
-        return value, "kg"
-    constraint = _constraint(problem, group.name)
-    if isinstance(constraint, KeepOut):
-        return constraint.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
-    if isinstance(constraint, SpeedLimit):
-        return constraint.limit * (np.sqrt(1 + value) - 1), "m/s"
-    if group.name == "actuator":
-        limit = problem.actuator.force_limit() or 1.0
-        squared = group.labels[component] == "magnitude"
-        return limit * (np.sqrt(1 + value) - 1 if squared else value), "N"
-    return value, _unit(problem, group, component, constraint)
+    unit = group.units[component]
+    if group.owner is None or group.owner.field in ("start", "goal"):
+        return value, unit or "-"
+    return group.owner.of(problem).violation(value, unit)
 
 
 def _unit_of_unknown(problem: TransferProblem, group: Group, component: int) -> str:
     units = {"position": "m", "mass": "kg", "duration": "s", "start.velocity": "m/s", "goal.velocity": "m/s"}
     return units.get(group.name) or problem.actuator.units(problem.dimension)[component]
-
-
-def _constraint(problem: TransferProblem, name: str) -> Constraint | None:
-    """The constraint that made a group of rows."""
-    if name.endswith(".speed"):
-        return next(limit for limit in problem.constraints if isinstance(limit, SpeedLimit))
-    number = name.rsplit("_", 1)[-1]
-    return problem.constraints[int(number) - 1] if number.isdigit() and "." not in name else None
-
-
-def _unit(problem: TransferProblem, group: Group, component: int, constraint: Constraint | None) -> str:
-    """The unit that a condition or a constraint of the user's states."""
-    n = problem.dimension
-    t, q, v, m = state_symbols(n)
-    if group.name.endswith(".condition"):
-        rows: Any = getattr(problem, group.name.split(".")[0]).rows(t, q, v, m)
-    elif constraint is not None:
-        rows = constraint.rows(t, q, ca.SX.sym("u", problem.actuator.size(n)), m) or constraint.speed_rows(v)
-    else:
-        return "-"
-    return rows[component].unit or "-" if component < len(rows) else "-"

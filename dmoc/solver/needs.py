@@ -1,62 +1,214 @@
-"""Limits that are too small: made larger, and told of in words."""
+"""How far limits must give way: a transfer whose limits can be relaxed, and words for what is enough."""
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.parts.forces import BallForce, BoxForce
-from dmoc.parts.speed import SpeedLimit
+from dmoc.basics.digits import down, up
+from dmoc.motion.path import DiscretePath
+from dmoc.nlp.elastic import Relaxation, Relaxed
+from dmoc.nlp.layout import Group
+from dmoc.nlp.program import NLP
+from dmoc.nlp.transcription import transcribe_onto
+from dmoc.nlp.units import units_of
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.objectives import Effort
 from dmoc.scene.problem import TransferProblem
 
-
-def force_words(actuator: Any, factor: float) -> str:
-    """The limit that is enough, so many times the one given, beside that one."""
-    if isinstance(actuator, BoxForce) and isinstance(actuator.limit, tuple):
-        needed = ", ".join(up(limit * factor) for limit in actuator.limit)
-        given = ", ".join(f"{limit:g}" for limit in actuator.limit)
-        return f"force limits of ({needed}) N (you gave ({given}) N)"
-    given = actuator.force_limit()
-    name = "force limit" if isinstance(actuator, (BallForce, BoxForce)) else "largest thrust"
-    return f"a {name} of {up(given * factor)} N (you gave {given:g} N)"
-
-
-def speed_limit(problem: TransferProblem) -> float | None:
-    return min((limit.limit for limit in problem.constraints if isinstance(limit, SpeedLimit)), default=None)
+# A limit gives way down to a tenth of itself while a duration is looked for that needs less of it.
+LEAST = -0.9
+# A chord between two nodes that cuts deeper into a zone than this part of its size leaps across it.
+LEAP = 0.1
+# At most this many durations are tried.
+MOST_DURATIONS = 9
+# Each duration differs from the one before by at most this, in the natural logarithm.
+WIDEST = 1.0
+# The limits are met to this part of themselves in the duration that is named.
+EXACT = 1e-3
 
 
-def times_of_limit(actuator: BallForce | BoxForce, control: np.ndarray) -> float:
-    """How many times the limit of an actuator the largest of some forces is."""
-    share = np.abs(control) / np.asarray(actuator.limit)
-    return float(np.linalg.norm(share, axis=1).max() if isinstance(actuator, BallForce) else share.max())
+@dataclass(frozen=True)
+class Giving:
+    """Limits that give way together: rows with the sign of their slack, unknowns with their shares.
+
+    With a slack s they must be `factor(s)` times as large, and `told(s)` says what is enough, empty if nothing
+    is. `falls` is the power of the duration with which the need falls.
+    """
+
+    told: Callable[[float], str]
+    factor: Callable[[float], float]
+    falls: int
+    rows: np.ndarray
+    signs: np.ndarray
+    columns: np.ndarray
+    below: np.ndarray
+    above: np.ndarray
 
 
-def times(part: Any, factor: float) -> Any:
-    """An actuator or a constraint with limits so many times as large."""
-    names = {field.name for field in fields(part)} if is_dataclass(part) else set()
-    limits = {name: getattr(part, name) for name in names & {"limit", "max_thrust", "box"}}
-    wider = {
-        name: tuple(factor * one for one in limit) if isinstance(limit, tuple) else factor * limit
-        for name, limit in limits.items()
-        if limit is not None
-    }
-    return replace(part, **wider) if wider else part
+class Relaxable:
+    """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort.
 
+    Limits are told of as those of `given`, which are smaller where they were raised.
+    """
 
-def up(value: float) -> str:
-    """Four digits, rounded away from what is too little."""
-    return _rounded(value, np.ceil)
+    def __init__(self, problem: TransferProblem, guess: DiscretePath, given: TransferProblem | None = None):
+        longest = problem.duration_bounds[1]
+        self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
+        self.problem = replace(problem, duration=longest, objective=Effort())
+        self.nlp: NLP = transcribe_onto(self.problem, self.guess, units_of(self.problem, self.guess))
+        self.bounds = self.nlp.bounds(self.problem)
 
+    def relaxed(self, *limits: Giving, least: float = 0.0) -> Relaxation:
+        """The elastic NLP in which these limits give way by one slack."""
+        rows = np.zeros((self.nlp.rows.size, 1))
+        for limit in limits:
+            rows[limit.rows, 0] = limit.signs
+        columns, below, above = (
+            np.concatenate([getattr(limit, name) for limit in limits]) for name in ("columns", "below", "above")
+        )
+        return Relaxation(self.nlp, rows, columns, below, above, least)
 
-def down(value: float) -> str:
-    return _rounded(value, np.floor)
+    def taken(self) -> tuple[float, float]:
+        """How many times the limits of force and of speed the guess takes on average; 0 without a limit.
 
+        Without controls its rows of motion lack the momentum that these would have to give.
+        """
+        nlp, time = self.nlp, self.guess.duration
+        coast, rows = replace(self.guess, control=0 * self.guess.control), nlp.rows["dynamics"]
+        g = nlp.assembly.constraints(nlp.pack(coast), nlp.parameters(self.problem)).full().ravel()
+        force = self.problem.mass * np.linalg.norm(rows.of(g) / rows.scales, axis=1).sum() / time
+        speed = np.linalg.norm(np.diff(coast.position, axis=0), axis=1).sum() / time
+        limits = self.problem.actuator.force_limit(), self._largest_speed()
+        return tuple(size / (limit or np.inf) for size, limit in zip((force, speed), limits, strict=True))
 
-def _rounded(value: float, how: Any) -> str:
-    if value <= 0:
-        return "0"
-    unit = 10.0 ** (np.floor(np.log10(value)) - 3)
-    # a whole number of units stays what it is
-    return f"{how(round(value / unit, 2)) * unit:.10g}"
+    def limits(self) -> list[Giving]:
+        """The limits that a longer duration eases."""
+        return [limit for limit in (self.force(), self.speed()) if limit is not None]
+
+    def force(self) -> Giving | None:
+        """The limit of the actuator."""
+        raised, given = self.problem.actuator, self.given.actuator
+        if raised.force_limit() is None:
+            return None
+
+        def told(slack: float) -> str:
+            return given.needs(raised.eased(slack))
+
+        def factor(slack: float) -> float:
+            return (raised.eased(slack).force_limit() or 0.0) / (given.force_limit() or 1.0)
+
+        groups = [group for group in self._groups() if group.owner and group.owner.field == "actuator"]
+        return self._giving(told, factor, groups, self.nlp.columns["force"].indices.ravel(), falls=2)
+
+    def speed(self) -> Giving | None:
+        """The limits on the speed, told of by the lowest."""
+        known = [
+            (speed, i) for i, part in enumerate(self.problem.constraints) if (speed := part.largest_speed())
+        ]
+        if not known:
+            return None
+        _, entry = min(known)
+        raised, given = self.problem.constraints[entry], self.given.constraints[entry]
+
+        def told(slack: float) -> str:
+            eased = raised.eased(slack)
+            return given.needs(eased, entry + 1, "") if eased else ""
+
+        def factor(slack: float) -> float:
+            eased = raised.eased(slack)
+            return (eased.largest_speed() or 0.0) / (given.largest_speed() or 1.0) if eased else np.inf
+
+        return self._giving(told, factor, [group for group in self._groups() if self._limits_speed(group)])
+
+    def zones(self) -> list[Giving]:
+        """The constraints that no longer duration eases, each by itself."""
+        entries = {
+            group.owner.entry
+            for group in self._groups()
+            if group.owner and group.owner.field == "constraints" and not self._limits_speed(group)
+        }
+        found = (self._zone(self.problem.constraints[entry], entry) for entry in sorted(entries))
+        return [limit for limit in found if limit is not None]
+
+    def _zone(self, zone: Constraint, entry: int) -> Giving | None:
+        mine = ("constraints", entry)
+        groups = [group for group in self._groups() if group.owner and group.owner[:2] == mine]
+        scale, unit = float(groups[0].scales.max()), groups[0].units[0]
+
+        def told(slack: float) -> str:
+            eased = zone.eased(slack)
+            return zone.needs(eased, entry + 1, f"{up(slack / scale)} {unit}".strip()) if eased else ""
+
+        return self._giving(told, lambda slack: 1 + slack, groups)
+
+    def _giving(
+        self,
+        told: Callable[[float], str],
+        factor: Callable[[float], float],
+        groups: list[Group],
+        columns: np.ndarray | None = None,
+        falls: int = 1,
+    ) -> Giving | None:
+        """Rows of some groups with a limit on one side, and unknowns with limits."""
+        lbx, ubx, lbg, ubg = self.bounds
+        rows = np.concatenate([*(group.indices.ravel() for group in groups), np.empty(0, int)]).astype(int)
+        rows = rows[np.isfinite(lbg[rows]) != np.isfinite(ubg[rows])]
+        columns = np.empty(0, int) if columns is None else columns
+        above = np.where(np.isfinite(ubx[columns]), ubx[columns], 0.0)
+        below = np.where(lbx[columns] == -ubx[columns], above, 0.0)
+        if not len(rows) and not above.any():
+            return None
+        signs = np.where(np.isfinite(lbg[rows]), 1.0, -1.0)
+        return Giving(told, factor, falls, rows, signs, columns, below, above)
+
+    def durations(self, joint: Relaxation, first: Relaxed, given: float) -> list[str]:
+        """A duration for which the limits are enough, by the secant method on logarithms.
+
+        The force that is needed falls with the square of the duration where nothing else acts, and
+        each duration starts from the answer for the one before.
+        """
+        first_duration = self.problem.duration_bounds[0]
+        tried = [(0.0, float(np.log1p(first.slack[0])))]
+        step, near, enough = 0.5 * tried[0][1], first, None
+        for _ in range(MOST_DURATIONS):
+            place = tried[-1][0] + float(np.clip(step, -WIDEST, WIDEST))
+            duration = float(first_duration * np.exp(place))
+            path = replace(near.path, duration=duration)
+            near = joint(replace(self.problem, duration=duration), path, near)
+            if not near.feasible:
+                break
+            tried.append((place, float(np.log1p(near.slack[0]))))
+            if near.slack[0] <= 0:
+                enough = place
+            if -2 * EXACT <= near.slack[0] <= 0:
+                break
+            (before, above), (place, below) = tried[-2:]
+            slope = (below - above) / (place - before)
+            # The next duration is aimed at a little more than enough.
+            step = -(below + EXACT) / slope if slope else WIDEST
+        if enough is None:
+            return []
+        needed = first_duration * np.exp(enough)
+        return [f"{up(needed) if needed > given else down(needed)} s (you gave {given:g} s)"]
+
+    def leaps(self, path: DiscretePath) -> bool:
+        """Whether a path leaps across a zone between two nodes: with enough force it can."""
+        inside = np.linspace(0, 1, 9)[1:-1, None, None]
+        chords = (1 - inside) * path.position[:-1] + inside * path.position[1:]
+        chords = chords.reshape(-1, path.position.shape[1])
+        zones = [zone for zone in self.problem.constraints if np.isfinite(zone.feature())]
+        return any((zone.excess(chords, chords) > LEAP * zone.feature()).any() for zone in zones)
+
+    def _groups(self) -> tuple[Group, ...]:
+        return self.nlp.rows.groups
+
+    def _limits_speed(self, group: Group) -> bool:
+        owner = group.owner
+        return owner is not None and owner.field == "constraints" and owner.of(self.problem).limits_speed
+
+    def _largest_speed(self) -> float | None:
+        speeds = (part.largest_speed() for part in self.problem.constraints)
+        return min((speed for speed in speeds if speed), default=None)

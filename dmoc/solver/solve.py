@@ -4,24 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
-from dmoc.guess.coast import MANY_TURNS
-from dmoc.guess.starting import angle_around, graded_guess, guess_on, is_uneven, starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import Progress, scaled_multipliers
-from dmoc.nlp.transcription import check_mesh, transcribe_onto, units_of
+from dmoc.nlp.program import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import Climb
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.meshes import first_path
 from dmoc.solver.tolerance import climb_to_tolerance
-
-DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
-# Steps a revolution, where there are many; at order 2 times the root of their number, as phase errors add up:
-# after n revolutions in N steps the goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
-A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
 
 
 def solve(
@@ -84,42 +74,16 @@ def solve(
         whole("steps", steps, least=2)
     if progress is not None and not callable(progress):
         raise ValueError(f"progress must be a function; got {short(progress)}")
-    climb = Climb(problem, options, progress, compiled)
+    ladder = Ladder(problem, options, progress, compiled)
     if tol is not None:
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
         tol = _tolerance(tol)
-        with climb.interrupt:
-            return climb_to_tolerance(climb, tol, order, steps, hold, guess)
-    first = first_guess(problem, order, steps, hold, guess, mesh)
-    with climb.interrupt:
-        climb.up_to(first, guess)
-    return climb.solution()
-
-
-def first_guess(
-    problem: TransferProblem,
-    order: int | None = None,
-    steps: int | None = None,
-    hold: bool = False,
-    guess: Any = None,
-    mesh: Any = None,
-) -> DiscretePath:
-    """The guess on the last mesh; what is not given of order and steps is as the motion needs it."""
-    ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
-    first = guess_on(problem, ends, order or 2, hold, guess)
-    if mesh is not None:
-        return first
-    turns = angle_around(problem, first) / (2 * np.pi)
-    if steps is None and turns > MANY_TURNS:
-        # the error adds up from one revolution to the next
-        order = order or (2 if hold else 6)
-        steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
-        first = starting_guess(problem, check_mesh(steps), order, hold, guess)
-    if is_uneven(problem, first):
-        order = order or (2 if hold else 4)
-        return graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
-    return first
+        with ladder.interrupt:
+            return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
+    first = first_path(problem, order, steps, hold, guess, mesh)
+    with ladder.interrupt:
+        return ladder.solution(ladder.climb_to(first, guess))
 
 
 def _tolerance(value: Any) -> float:
@@ -127,14 +91,3 @@ def _tolerance(value: Any) -> float:
     if not 1e-11 <= tol <= 0.1:
         raise ValueError(f"tol must lie between 1e-11 and 0.1 [-]; got {tol:g}")
     return tol
-
-
-def stationarity(problem: TransferProblem, path: DiscretePath) -> float:
-    """Largest entry of the scaled gradient of the Lagrangian, over the unknowns that are not fixed [-]."""
-    nlp = transcribe_onto(problem, path, units_of(problem, path))
-    x, p = nlp.pack(path), nlp.parameters(problem)
-    lam_x, lam_g = scaled_multipliers(nlp, path)
-    slope = np.array(nlp.assembly.gradient(x, p)[1]).ravel()
-    jacobian = nlp.assembly.jacobian(x, p)[1].sparse()
-    lbx, ubx, _, _ = nlp.bounds(problem)
-    return float(np.abs(slope + jacobian.T @ lam_g + lam_x)[lbx < ubx].max(initial=0.0))

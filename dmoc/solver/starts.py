@@ -13,11 +13,13 @@ from dmoc.guess.starting import starting_guess
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import COARSEST_NODES, Climb
-from dmoc.solver.solve import first_guess
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
 
-# Objectives closer than this, relative, on paths closer than this part of the extent, are one optimum.
-SAME_OBJECTIVE, SAME_PATH = 1e-4, 1e-2
+# Two answers are one optimum if their objectives differ by less than this, relative ...
+SAME_OBJECTIVE = 1e-4
+# ... and their paths by less than this part of the extent.
+SAME_PATH = 1e-2
 
 
 @dataclass(frozen=True)
@@ -51,19 +53,19 @@ def local_optima(
     keep-out zones paths that bend around each on either side, then random bends. The same numbers
     are drawn every time.
     """
-    base = first_guess(problem, order, None, hold, guess)
+    base = first_path(problem, order, None, hold, guess)
     if order or base.order == 2:
-        steps = max(COARSEST_NODES[True] // (base.order // 2), Climb(problem).least_steps(base))
+        steps = max(COARSEST_NODES[True] // (base.order // 2), least_steps(problem, base))
         base = starting_guess(problem, check_mesh(steps), base.order, hold, guess)
     found: list[Optimum] = []
     for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
-        climb = Climb(problem)
-        with climb.interrupt:
-            solved = climb.up_to(start, start)
-        if climb.answer.status == "stopped":
+        ladder = Ladder(problem)
+        with ladder.interrupt:
+            rung = ladder.climb_to(start, start)
+        if rung.stopped:
             break
-        if solved:
-            _add(found, Optimum(climb.levels[-1].objective, climb.path, (name,)))
+        if rung.solved:
+            _add(found, Optimum(rung.level.objective, rung.path, (name,)))
     return sorted(found, key=lambda optimum: problem.objective.sense * optimum.objective)
 
 

@@ -5,41 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from dmoc.guess.starting import graded_guess, is_uneven, starting_guess
-from dmoc.motion.dynamics import Dynamics, state_symbols
-from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import node_weights, step_nodes
-from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.reference import reference
-from dmoc.motion.step import step_map
-from dmoc.nlp.ipopt import Answer
-from dmoc.nlp.transcription import NLP, check_mesh
 from dmoc.results.facts import Error
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import Climb
+from dmoc.solver.estimate import TINY, change, estimate, local_errors, rounding_cost
+from dmoc.solver.ladder import Ladder, Rung
+from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
+from dmoc.solver.switches import corners, is_singular, switch_times
 
-MOST_NODES, MOST_MESHES = 200_000, 14
-TRIAL_ORDER, TRIAL_STEPS = 4, 20
-# Into how many parts a step is cut where the control jumps, and the shortest step that this makes.
-PARTS, SHORTEST = 4, 1e-5
-# A control within this share of its span of a limit is at the limit; so many nodes between make an arc.
-BETWEEN = 0.05
+# Refinement ends at this many nodes ...
+MOST_NODES = 200_000
+# ... or after this many meshes, by which time steps at a switch have come down to the shortest.
+MOST_MESHES = 14
+# A step in which the control jumps is cut into this many parts.
+PARTS = 4
+# No step becomes shorter than this part of the duration.
+SHORTEST = 1e-5
 # More switches than this are not listed.
 MOST_SWITCHES = 12
-# After so many meshes that do no better, the best one is the answer: steps have come down to rounding.
+# After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
-# By how much the error falls from mesh to mesh, at least.
-LEAST_FALL = 1.5
-TINY = float(np.finfo(float).tiny)
 
 
 def climb_to_tolerance(
-    climb: Climb, tol: float, order: int | None, steps: int | None, hold: bool, guess: Any
+    ladder: Ladder, tol: float, order: int | None, steps: int | None, hold: bool, guess: Any
 ) -> Solution:
     """Refine until the estimated error is below a tolerance, on meshes that each cut steps of the one before.
 
@@ -47,152 +39,113 @@ def climb_to_tolerance(
     pays. All step ends are kept from mesh to mesh: the answer on one is a good start for the next, and
     the change there tells the error.
     """
-    problem = climb.problem
-    if not climb.up_to(_first(climb, order or TRIAL_ORDER, steps, hold, guess), guess):
-        return climb.solution(tolerance=tol)
-    path, objective = climb.path, climb.levels[-1].objective
-    order, reason = (order, "the order as given") if order else _best_order(problem, path, objective, tol)
-    local = not _is_singular(problem, path)
-    changes: list[tuple[float, float]] = []
-    best: _Found | None = None
-    worse = 0
-    mesh = _as_many_nodes(path, order)
-    longest = np.diff(mesh).max()
-    if order != path.order and not climb.solve_on(path.onto(mesh, order, hold)):
-        return climb.solution(tolerance=tol)
-    while True:
-        path, objective = climb.path, climb.levels[-1].objective
-        # the error where a control jumps falls with the length of the step there alone, here halved
-        parts, most = np.full(len(path.mesh) - 1, 2), 2.0
-        if local:
-            wanted = max(longest / PARTS ** (len(changes) + 1), SHORTEST)
-            errors = local_errors(climb.dynamics, path, problem.start_time)
-            corners = _corners(problem, path, objective)
-            parts = _parts(path, errors, corners, wanted)
-            most = PARTS - 1.0 if len(corners) else 2.0 ** (2 if hold else order)
-        if not climb.solve_on(path.onto(_cut(path.mesh, parts), order, hold)):
-            if best is None or climb.answer.status == "stopped":
-                return climb.solution(tolerance=tol)
-            return _settled(climb, tol, best, f"{reason}; a finer mesh was not solved")
-        changes.append(_change((path, objective), (climb.path, climb.levels[-1].objective), parts))
-        error = estimate(climb, changes, most)
-        rounded = rounding_cost(problem, climb.path) / max(abs(climb.levels[-1].objective), TINY)
-        # what the rounding of |F| costs counts, but no mesh brings it down
-        met = error.largest <= tol
-        error = replace(error, objective=error.objective + rounded)
-        climb.levels[-1] = replace(climb.levels[-1], error=error.largest)
-        found = _Found(climb.nlp, climb.answer, error)
-        if best is None or error.largest < best.error.largest:
-            best, worse = found, 0
-        else:
-            worse += 1
-        if rounded > tol and (met or len(changes) == MOST_MESHES):
-            reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
-        if met or len(climb.path.position) > MOST_NODES or len(changes) == MOST_MESHES:
-            return _settled(climb, tol, best, reason)
-        if worse == PATIENCE:
-            return _settled(climb, tol, best, f"{reason}; finer meshes did no better")
+    first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
+    trial = ladder.climb_to(first, guess)
+    if not trial.solved:
+        return ladder.solution(trial, tolerance=tol)
+    path = trial.path
+    order, reason = (order, "the order as given") if order else _best_order(ladder.problem, trial, tol)
+    begun = trial
+    if order != path.order:
+        begun = ladder.solve_on(path.onto(with_as_many_nodes(path, order), order, hold))
+        if not begun.solved:
+            return ladder.solution(begun, tolerance=tol)
+    local = not is_singular(ladder.problem, path)
+    return _Refinement(ladder, tol, local, reason).of(begun, order, hold)
 
 
 @dataclass(frozen=True)
 class _Found:
     """An answer on one mesh, and how far off it is."""
 
-    nlp: NLP
-    answer: Answer
+    rung: Rung
     error: Error
 
 
-def _settled(climb: Climb, tol: float, best: _Found, reason: str) -> Solution:
-    """The best answer that was found, which need not be the last one."""
-    climb.nlp, climb.answer = best.nlp, best.answer
-    return climb.solution(tolerance=tol, error=best.error, reason=_words(climb.problem, climb.path, reason))
+class _Refinement:
+    """The meshes after the first, each a refinement of the one before, and the best answer so far."""
+
+    def __init__(self, ladder: Ladder, tol: float, local: bool, reason: str):
+        self.ladder, self.problem, self.tol, self.local, self.reason = (
+            ladder,
+            ladder.problem,
+            tol,
+            local,
+            reason,
+        )
+        self.changes: list[tuple[float, float]] = []
+        self.errors: dict[int, float] = {}
+        self.best: _Found | None = None
+        self.worse = 0
+
+    def of(self, rung: Rung, order: int, hold: bool) -> Solution:
+        """Refine from a first answer until the tolerance is met or nothing is gained any more."""
+        longest = np.diff(rung.nlp.mesh).max()
+        while True:
+            coarse, cost = rung.path, rung.level.objective
+            parts, most = self._cuts(coarse, cost, longest)
+            rung = self.ladder.solve_on(coarse.onto(_cut(coarse.mesh, parts), order, hold))
+            if not rung.solved:
+                if self.best is None or rung.stopped:
+                    return self.ladder.solution(rung, self.errors, tolerance=self.tol)
+                return self._settled(f"{self.reason}; a finer mesh was not solved")
+            fine = rung.path
+            self.changes.append(change((coarse, cost), (fine, rung.level.objective), parts))
+            met = self._judge(rung, fine, most)
+            if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
+                return self._settled(self.reason)
+            if self.worse == PATIENCE:
+                return self._settled(f"{self.reason}; finer meshes did no better")
+
+    def _cuts(self, path: DiscretePath, objective: float, longest: float) -> tuple[np.ndarray, float]:
+        """Into how many parts to cut each step, and by how much the error falls then at most.
+
+        Where a control jumps the error falls with the length of the step there alone.
+        """
+        if not self.local:
+            return np.full(len(path.mesh) - 1, 2), 2.0
+        wanted = max(longest / PARTS ** (len(self.changes) + 1), SHORTEST)
+        errors = local_errors(self.ladder.dynamics, path, self.problem.start_time)
+        places = corners(self.problem, path, objective)
+        most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
+        return _parts(path, errors, places, wanted), most
+
+    def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
+        """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
+
+        What the rounding of |F| costs counts in the error, but no mesh brings it down: it does not decide.
+        """
+        found = estimate(self.problem, self.ladder.dynamics, path, self.changes, most)
+        met = found.largest <= self.tol
+        rounded = rounding_cost(self.problem, path) / max(abs(rung.level.objective), TINY)
+        found = replace(found, objective=found.objective + rounded)
+        self.errors[rung.number] = found.largest
+        if self.best is None or found.largest < self.best.error.largest:
+            self.best, self.worse = _Found(rung, found), 0
+        else:
+            self.worse += 1
+        if rounded > self.tol and (met or len(self.changes) == MOST_MESHES):
+            self.reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
+        return met
+
+    def _settled(self, reason: str) -> Solution:
+        """The best answer that was found, which need not be the last one."""
+        assert self.best is not None
+        words = _words(self.problem, self.best.rung.path, reason)
+        more = {"tolerance": self.tol, "error": self.best.error, "reason": words}
+        return self.ladder.solution(self.best.rung, self.errors, **more)
 
 
-def _first(climb: Climb, order: int, steps: int | None, hold: bool, guess: Any) -> DiscretePath:
-    """A guess for the trial, with as many steps as the motion along it needs."""
-    problem = climb.problem
-
-    def on(count: int) -> DiscretePath:
-        first = starting_guess(problem, check_mesh(count), order, hold, guess)
-        return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
-
-    first = on(steps or TRIAL_STEPS)
-    enough = 2 * climb.least_steps(first)
-    return on(enough) if steps is None and enough > TRIAL_STEPS else first
-
-
-def _as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:
-    """The mesh of a path for another order, with about as many nodes and at least eight steps."""
-    steps = max(8, (len(path.mesh) - 1) * path.order // order)
-    places = np.linspace(0.0, 1.0, len(path.mesh))
-    return path.mesh if order == path.order else np.interp(np.linspace(0.0, 1.0, steps + 1), places, path.mesh)
-
-
-def _best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:
+def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int, str]:
     """The order that pays, and why."""
+    path = trial.path
     if path.hold:
         return 2, "held forces are second order whatever the scheme"
-    if _is_singular(problem, path):
+    if is_singular(problem, path):
         return 2, "controls stay between their limits where no cost decides on them"
-    if len(_corners(problem, path, objective)):
+    if len(corners(problem, path, trial.level.objective)):
         return 4, "controls switch or limits set in"
     return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
-
-
-def _is_singular(problem: TransferProblem, path: DiscretePath) -> bool:
-    """Whether controls that the cost is linear in stay between their limits for longer than a switch takes.
-
-    On such arcs a control at the inner nodes of a step is not determined, and wanders.
-    """
-    share = _shares(problem, path)
-    between = np.any((share > BETWEEN) & (share < 1 - BETWEEN), axis=1)
-    inside = between[1:-1] & between[:-2] & between[2:]
-    return bool(inside.sum() > BETWEEN * len(inside))
-
-
-def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
-    """When a control that the cost is linear in passes the middle between its limits [s]."""
-    fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
-    above = _shares(problem, path) - 0.5
-    node, column = np.nonzero(np.diff(above > 0, axis=0))
-    before, after = above[node, column], above[node + 1, column]
-    at = fractions[node] + before / (before - after) * (fractions[node + 1] - fractions[node])
-    return problem.start_time + path.duration * np.sort(at)
-
-
-def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
-    """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
-    u = ca.SX.sym("u", path.control.shape[1])
-    rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
-    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    limited = np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
-    return (path.control - lower)[:, limited] / (upper - lower)[limited]
-
-
-def _corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:
-    """Steps in which a control jumps or a limit sets in or lets go: there higher derivatives jump.
-
-    A limit acts in a step if loosening it by its own size would change the objective by a millionth.
-    A throttle with |F| rounded at zero never quite reaches its lower limit: there only jumps count.
-    """
-    extent, _ = path_scales(path)
-    limit = 0.0 if problem.actuator.smoothing is not None else problem.actuator.force_limit() or 0.0
-    sizes = {"column:force": limit, "column:position": extent}
-    found, steps = [control_jumps(problem, path)], len(path.mesh) - 1
-    for key, density in path.multipliers.items():
-        kind, name = key.split(":", 1)
-        if kind not in ("node", "control", "step"):
-            continue
-        share = np.abs(density).max(axis=1) / len(density) * sizes.get(name, 1.0)
-        if name == "column:position":
-            share[[0, -1]] = 0.0
-        if len(share) > steps:
-            share = share[step_nodes(steps, scheme(path.order))].max(axis=0)
-        # what the barrier leaves beside a limit that acts is no part of it
-        acts = (share > 1e-6 * abs(objective)) & (share > 1e-3 * share.max())
-        found.append(np.flatnonzero(np.diff(acts)))
-    return np.unique(np.concatenate(found))
 
 
 def _parts(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
@@ -215,97 +168,6 @@ def _parts(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest
 def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
     pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(mesh[:-1], mesh[1:], parts, strict=True)]
     return np.append(np.concatenate(pieces), mesh[-1])
-
-
-def _change(
-    coarse: tuple[DiscretePath, float], fine: tuple[DiscretePath, float], parts: np.ndarray
-) -> tuple[float, float]:
-    """Relative change of path and objective from one mesh to the next, at the step ends they share."""
-    shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
-    moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max()
-    stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
-    scale = max(abs(fine[1]), TINY)
-    return max(float(moved) / path_scales(fine[0])[0], stretched), abs(fine[1] - coarse[1]) / scale
-
-
-def estimate(climb: Climb, changes: list[tuple[float, float]], most: float) -> Error:
-    """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
-
-    Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
-    f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
-    """
-    problem, path = climb.problem, climb.path
-    fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
-    moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
-    extent, speed = path_scales(path)
-    position, velocity = reference(climb.dynamics, path, problem.start_time, path.start_velocity)
-    miss = np.linalg.norm(position - path.position[-1]) / extent
-    slip = np.linalg.norm(velocity - path.goal_velocity) / speed
-    return Error(moved, cost, float(max(miss, slip)))
-
-
-def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
-    """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
-
-    The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
-    e / sqrt(|F|^2 + e^2) by e, and its multipliers are the derivatives of the objective.
-    """
-    width, density = problem.actuator.smoothing, path.multipliers.get("control:row:actuator")
-    if width is None or density is None:
-        return 0.0
-    weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
-    force = np.linalg.norm(path.control[:, : problem.dimension], axis=1) / problem.actuator.force_limit()
-    return float(abs(weights * density[:, 0] @ (width**2 / np.hypot(force, width))))
-
-
-def path_scales(path: DiscretePath) -> tuple[float, float]:
-    """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
-    extent = float(np.linalg.norm(np.ptp(path.position, axis=0)))
-    ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
-    extent = extent or ends * path.duration or 1.0
-    length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
-    return extent, max(length / path.duration, ends) or extent / path.duration
-
-
-def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
-    """Error of every step by integrating it again with two halves of order 8, over extent and speed [-]."""
-    rule, fine = scheme(path.order), scheme(8)
-    n, steps = dynamics.dimension, len(path.mesh) - 1
-    momentum, _ = end_momenta(dynamics, path, start_time)
-    extent, speed = path_scales(path)
-    states = np.concatenate([path.position[:: rule.degree], momentum], axis=1)
-    now = states[:-1]
-    at = step_nodes(steps, rule)
-    h = path.duration * np.diff(path.mesh)
-    origin, march = path.position[0], step_map(dynamics, fine, path.hold).map(steps)
-    for half in (0, 1):
-        fractions = 0.5 * (half + fine.points)
-        # controls of one step stand side by side: axis first, then node, then step
-        control = path.control.T
-        if not path.hold:
-            control = np.einsum("ij,jkn->nki", rule.values_at(fractions), path.control[at])
-            control = control.reshape(control.shape[0], -1)
-        mass = rule.values_at(fractions) @ path.mass[at]
-        times = start_time + path.duration * path.mesh[:-1] + 0.5 * half * h
-        q, p = (now[:, :n] - origin).T, now[:, n:].T
-        moves = march(q, p, mass, control, times[None], 0.5 * h[None], origin)
-        now = now + np.array(np.vstack([np.array(moves[0]), np.array(moves[1])])).T
-    gap = np.abs(states[1:] - now) / np.repeat([extent, speed], n)
-    return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)
-
-
-def control_jumps(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
-    """Steps within which a limited control goes from near one of its limits to near another."""
-    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    control = path.control
-    if problem.actuator.force_limit() is None or len(control) < 3:
-        return np.empty(0, int)
-    span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.force_limit() or 1.0))
-    ends = control if path.hold else control[:: path.order // 2]
-    change = (np.abs(np.diff(ends, axis=0)) / span).max(axis=1)
-    # a jump takes one step, or two with a node in its middle; what goes on beyond them is a steep slope
-    around = np.pad(change, 2)
-    return np.flatnonzero((change > 0.2) & (change > 3 * np.maximum(around[:-4], around[4:])))
 
 
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:

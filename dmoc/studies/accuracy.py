@@ -14,18 +14,18 @@ import numpy as np
 
 from dmoc.basics.arguments import number
 from dmoc.basics.memory import forget
-from dmoc.guess.starting import guess_on, starting_guess
+from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.motion.reference import reference as fly
 from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import Climb
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.meshes import guess_on
 from dmoc.solver.solve import solve
-from dmoc.solver.tolerance import path_scales
 from dmoc.studies.other_methods import Formulation as Formulation
 from dmoc.studies.other_methods import Method, Run, counted, solve_other
 
@@ -246,10 +246,10 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compile
 
     def solve_with(options: dict[str, Any]) -> tuple[Solution, float]:
         begun = time.perf_counter()
-        climb = Climb(problem, options, compiled=compiled)
+        ladder = Ladder(problem, options, compiled=compiled)
         first = guess_on(problem, uniform_mesh(steps), order, False)
-        climb.up_to(first) if climbs else climb.solve_on(first)
-        return climb.solution(), time.perf_counter() - begun
+        rung = ladder.climb_to(first) if climbs else ladder.solve_on(first)
+        return ladder.solution(rung), time.perf_counter() - begun
 
     try:
         (found, seconds), calls = counted(solve_with)

@@ -26,8 +26,9 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import reference
-from dmoc.nlp.stencils import formulas_of
-from dmoc.nlp.transcription import transcribe_onto, units_of
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.transcription import transcribe_onto
+from dmoc.nlp.units import units_of
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
@@ -152,7 +153,7 @@ def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: 
 
 def _instructions(problem: TransferProblem, path: DiscretePath) -> int:
     """Instructions of one evaluation of node, step and ends with their derivatives."""
-    kernels = [stencil.kernel for stencil in formulas_of(problem, path.order, path.hold).stencils]
+    kernels = [stencil.kernel for stencil in stencils_of(problem, path.order, path.hold).stencils]
     return sum(part.n_instructions() for kernel in kernels for part in kernel.functions.values())
 
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import STATUS, make_solver, tolerance
+from dmoc.nlp.ipopt import make_solver, status_of
+from dmoc.nlp.settings import settings_for, tolerance
 from dmoc.scene.problem import TransferProblem
 
 
@@ -92,16 +93,10 @@ def formulated(name: str, method: Method, problem: TransferProblem, steps: int) 
     return made
 
 
-def as_nlp(problem: TransferProblem, made: Formulation, steps: int) -> Any:
+def as_assembly(made: Formulation) -> Any:
     """A formulation in the form that `make_solver` takes; without derivatives CasADi makes its own."""
     derivatives = dict.fromkeys(("jacobian", "hessian", "gradient"))
-    return SimpleNamespace(
-        problem=problem,
-        mesh=uniform_mesh(steps),
-        scheme=SimpleNamespace(degree=max(len(made.points) - 1, 1)),
-        row_bounds=made.row_bounds,
-        assembly=SimpleNamespace(x=made.x, p=ca.MX.sym("p", 0), f=made.f, g=made.g, **derivatives),
-    )
+    return SimpleNamespace(x=made.x, p=ca.MX.sym("p", 0), f=made.f, g=made.g, **derivatives)
 
 
 def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
@@ -142,7 +137,9 @@ def solve_other(problem: TransferProblem, name: str, method: Method, steps: int)
     def solve_with(options: dict[str, Any]) -> tuple[Formulation, dict, dict, list[float]]:
         times = [time.perf_counter()]
         made = formulated(name, method, problem, steps)
-        solver = make_solver(as_nlp(problem, made, steps), enough | options)
+        degree = max(len(made.points) - 1, 1)
+        settings = settings_for(problem, uniform_mesh(steps), degree)
+        solver = make_solver(as_assembly(made), settings, enough | options)
         (lbx, ubx), (lbg, ubg) = made.bounds, made.row_bounds
         x0 = np.clip(made.guess, lbx, ubx)
         times.append(time.perf_counter())
@@ -151,7 +148,7 @@ def solve_other(problem: TransferProblem, name: str, method: Method, steps: int)
 
     (made, result, stats, (begun, ready, done)), calls = counted(solve_with)
     path, nodes = path_of(problem, made, steps, result["x"])
-    objective, status = made.objective_unit * float(result["f"]), STATUS.get(stats["return_status"], "failed")
+    objective, status = made.objective_unit * float(result["f"]), status_of(stats["return_status"])
     return Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
 
 

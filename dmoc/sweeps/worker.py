@@ -85,7 +85,7 @@ def pack(path: DiscretePath) -> str:
 
     arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
     arrays |= {name: getattr(path, name) for name in ("start_velocity", "goal_velocity")}
-    arrays |= {MULTIPLIER + name: values for name, values in path.multipliers.items()}
+    arrays |= {MULTIPLIER + str(key): values for key, values in path.multipliers.items()}
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer, order=path.order, hold=path.hold, duration=path.duration, allow_pickle=False, **arrays

@@ -9,7 +9,7 @@ import pytest
 from dmoc import solve
 from dmoc.basics.compiled import compiled
 from dmoc.basics.memory import forget
-from dmoc.nlp.stencils import formulas_of
+from dmoc.nlp.stencils import stencils_of
 from dmoc.scene.problem_file import load_problem
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -28,7 +28,7 @@ def own_folder(tmp_path, monkeypatch):
 def functions():
     """Those of a step around the Earth, with air."""
     problem = load_problem("leo_raise").make()
-    return formulas_of(problem, 4, False).stencils[1].kernel.functions
+    return stencils_of(problem, 4, False).stencils[1].kernel.functions
 
 
 def is_machine_code(found):

@@ -31,7 +31,7 @@ from dmoc import (
 )
 from dmoc.basics.memory import identity, remembered
 from dmoc.motion.dynamics import Dynamics
-from dmoc.nlp.stencils import formulas_of
+from dmoc.nlp.stencils import stencils_of
 
 
 class Near(NamedTuple):
@@ -142,7 +142,7 @@ def scene(**parts):
 def values(problem):
     """What all functions of nodes, steps and ends give for the same numbers, and the forward motion."""
     numbers, found = np.random.default_rng(1), []
-    formulas = formulas_of(problem, 4, False)
+    formulas = stencils_of(problem, 4, False)
     for stencil in formulas.stencils:
         for name in ("rows", "cost"):
             function = stencil.kernel.functions[name]
@@ -173,9 +173,9 @@ def test_what_may_change_without_a_rebuild_shares_functions():
         scene(duration=d, actuator=BallForce(limit), start=State(q, (0, 1)), constraints=KeepOut((1, 3), d / 9))
         for d, limit, q in ((3.0, 1.0, (1, 0)), (4.0, 2.0, (1, 1)))
     )
-    assert formulas_of(first, 2, False) is formulas_of(second, 2, False)
-    assert formulas_of(first, 2, False) is not formulas_of(first, 2, True)
-    assert formulas_of(first, 2, False) is not formulas_of(replace(first, duration=(3.0, 4.0)), 2, False)
+    assert stencils_of(first, 2, False) is stencils_of(second, 2, False)
+    assert stencils_of(first, 2, False) is not stencils_of(first, 2, True)
+    assert stencils_of(first, 2, False) is not stencils_of(replace(first, duration=(3.0, 4.0)), 2, False)
 
 
 @pytest.mark.parametrize(

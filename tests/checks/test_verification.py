@@ -38,6 +38,7 @@ from dmoc.checks.verification import verify
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import COSTATE
 from dmoc.scene.problem_file import load_problem
 
 CHECKS = ["residual", "rollout", "reference", "ledger", "bounds", "optimality", "stability"]
@@ -337,7 +338,7 @@ def test_bounds_say_that_the_duration_sits_on_its_limit():
 )
 def test_optimality_fails_alone_on_other_costates(orbit, corrupt):
     known = orbit.path.multipliers
-    key = "smooth:row:dynamics"
+    key = COSTATE
     bad = with_path(orbit, multipliers=known | {key: corrupt(known[key])})
     assert failing(verify(bad)) == ["optimality"]
 
@@ -346,7 +347,7 @@ def test_optimality_sees_every_multiplier(flyer, cart):
     """Also those of limits that do not act, of the wrong sign, or of the boundary entries."""
     for solution in (flyer, cart):
         known = solution.path.multipliers
-        size = np.abs(known["smooth:row:dynamics"]).max()
+        size = np.abs(known[COSTATE]).max()
         for key, values in known.items():
             if values.size:
                 more = nudged(values, (len(values) // 3, 0), 0.01 * size)
@@ -373,9 +374,9 @@ def test_optimality_means_the_same_on_every_mesh():
     for steps in (100, 1600):
         solution = solve(made("orbit_raise"), steps=steps)
         known = solution.path.multipliers
-        values = known["smooth:row:dynamics"]
+        values = known[COSTATE]
         wave = 1e-4 * np.abs(values).max() * np.sin(np.pi * solution.path.fractions)[:, None] ** 4
-        bad = with_path(solution, multipliers=known | {"smooth:row:dynamics": values + wave})
+        bad = with_path(solution, multipliers=known | {COSTATE: values + wave})
         found.append(stationarity(Case(bad)))
     coarse, fine = found
     assert coarse.force == pytest.approx(1e-4, rel=0.1)

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from dmoc import PointGravity, Spring, State, TransferProblem, simulate, solve, three_body, verify
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.solver.ladder import Climb
+from dmoc.solver.ladder import Ladder
 
 # h omega at which each order first loses stability
 LIMITS = {2: 2.0, 4: 2 * np.sqrt(2.0), 6: 3.1129, 8: 3.14043}
@@ -61,10 +61,11 @@ def test_a_mesh_beyond_the_limit_is_refused_and_one_below_it_is_not(order):
 def test_without_the_refusal_a_stiff_spring_is_solved_wrong_and_its_march_agrees():
     """At h omega = 2.05 the march of the forces meets the path, and the cost is 16 times too small."""
     problem, true = spring(20 * 2.05), solve(spring(20 * 2.05), order=8, steps=100)
-    climb = Climb(problem)
-    with climb.interrupt:
-        assert climb.solve_on(starting_guess(problem, uniform_mesh(20), 2, False))
-    wrong = climb.solution()
+    ladder = Ladder(problem)
+    with ladder.interrupt:
+        rung = ladder.solve_on(starting_guess(problem, uniform_mesh(20), 2, False))
+    assert rung.solved
+    wrong = ladder.solution(rung)
     report = verify(wrong)
     assert report["residual"].ok and report["rollout"].ok
     assert not report["stability"].ok

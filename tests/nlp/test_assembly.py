@@ -31,7 +31,6 @@ from dmoc import (
     transcribe,
 )
 from dmoc.guess.starting import starting_guess
-from dmoc.nlp.ipopt import make_solver, run
 
 
 class Lag(Objective):
@@ -312,7 +311,7 @@ def test_solving_again_with_new_numbers_equals_a_fresh_solve(what, hold):
 
     def objective(nlp, problem):
         guess = starting_guess(problem, nlp.mesh, nlp.scheme.order, hold)
-        answer = run(make_solver(nlp), nlp, problem, guess)
+        answer = nlp.run(nlp.solver(), problem, guess)
         assert answer.status == "solved"
         return answer.objective * nlp.units.cost
 

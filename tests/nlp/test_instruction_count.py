@@ -25,8 +25,9 @@ from dmoc import (
 )
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.nlp.blocks import Transcript
-from dmoc.nlp.transcription import units_of
+from dmoc.nlp.placement import Placement
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import units_of
 
 STEPS = 6
 RESTING = [UniformGravity((0, -9.81)), PointGravity(1.0), Spring(2.0, (0, 0))]
@@ -57,7 +58,9 @@ def script(problem, order=2, hold=False):
     """Layouts and blocks of a problem."""
     mesh = np.linspace(0, 1, STEPS + 1)
     guess = starting_guess(problem, mesh, order, hold)
-    return Transcript(problem, scheme(order), hold, mesh, units_of(problem, guess))
+    return Placement(
+        problem, stencils_of(problem, order, hold), scheme(order), hold, mesh, units_of(problem, guess)
+    )
 
 
 def counts(problem, order=2, hold=False):

@@ -14,7 +14,7 @@ from dmoc import solve
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import catalogue, load_problem
-from dmoc.solver.ladder import Climb
+from dmoc.solver.ladder import Ladder
 
 # Each problem at its defaults, (order, steps): iterations and evaluations on all meshes.
 RECORD = {
@@ -83,10 +83,10 @@ def test_the_last_mesh_takes_no_more_iterations_warm_than_cold(name, order, step
     counts = []
     for mass in MASSES if name in JUMPY else (1.0,):
         case = replace(problem, mass=mass * problem.mass)
-        cold = Climb(case, {"ipopt.max_iter": MOST})
-        cold.solve_on(starting_guess(case, uniform_mesh(steps), order, False))
+        cold = Ladder(case, {"ipopt.max_iter": MOST})
+        alone = cold.solve_on(starting_guess(case, uniform_mesh(steps), order, False))
         last = solve(case, order=order, steps=steps).raise_for_status().ladder[-1]
-        counts.append((last.iterations, cold.levels[-1].iterations))
+        counts.append((last.iterations, alone.level.iterations))
     ours, theirs = map(sum, zip(*counts, strict=True))
     assert ours <= theirs, f"warm and cold {counts}"
 

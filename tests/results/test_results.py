@@ -14,6 +14,7 @@ import xarray
 
 from dmoc import BoxForce, KeepOut, PointGravity, SpeedLimit, State, Time, TransferProblem, load, solve
 from dmoc.basics.files import sealed
+from dmoc.motion.path import Key
 from dmoc.results.table import SOLUTION_FILE, to_dataset
 
 
@@ -175,11 +176,11 @@ def test_every_variable_has_a_unit_and_the_promised_dimensions(case):
 
 def test_groups_whose_names_look_alike_in_a_file_stay_apart(saved, tmp_path):
     solution = load(saved)
-    twins = {"end:row:a.b": np.ones((1, 1)), "end:row:a_b": np.zeros((1, 1))}
+    twins = {Key("end", "row", "a.b"): np.ones((1, 1)), Key("end", "row", "a_b"): np.zeros((1, 1))}
     path = dataclasses.replace(solution.path, multipliers=solution.path.multipliers | twins)
     dataclasses.replace(solution, path=path).save(tmp_path / "s.nc")
     back = load(tmp_path / "s.nc").path.multipliers
-    assert back["end:row:a.b"] == 1 and back["end:row:a_b"] == 0
+    assert back[Key("end", "row", "a.b")] == 1 and back[Key("end", "row", "a_b")] == 0
 
 
 def test_a_loaded_solution_has_no_problem_until_one_is_attached(saved):

@@ -22,7 +22,6 @@ from dmoc import (
 )
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.nlp.ipopt import make_solver, run
 from dmoc.parts.rows import values_of, with_symbols
 
 MU, CENTER = 1.7, (0.3, -0.2, 0.5)
@@ -221,7 +220,7 @@ def test_an_orbit_can_change_without_a_rebuild(first, second):
     old, new = (TransferProblem(1.0, CIRCLE, goal, 5.0, effects=GRAVITY) for goal in (first, second))
     nlp = transcribe(old, 50)
     nlp.accepts(new)
-    answer = run(make_solver(nlp), nlp, new, starting_guess(new, uniform_mesh(50), 2, False))
+    answer = nlp.run(nlp.solver(), new, starting_guess(new, uniform_mesh(50), 2, False))
     assert answer.status == "solved"
     assert nlp.objective(answer.objective) == pytest.approx(solve(new, steps=50).objective, rel=1e-8)
 

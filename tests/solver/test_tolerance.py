@@ -7,7 +7,8 @@ import pytest
 
 from dmoc import solve, verify
 from dmoc.scene.problem_file import load_problem
-from dmoc.solver.tolerance import rounding_cost, switch_times
+from dmoc.solver.estimate import rounding_cost
+from dmoc.solver.switches import switch_times
 
 # Problem, tolerance, optimum, most steps that this may take (a few times what it takes), order.
 KNOWN = [

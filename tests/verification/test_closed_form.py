@@ -20,6 +20,7 @@ from dmoc import (
     TransferProblem,
     solve,
 )
+from dmoc.motion.path import POSITION_BOUNDS
 
 MASS, DISTANCE, DURATION = 3.0, 2.0, 4.0
 SCALE = MASS**2 * DISTANCE**2 / DURATION**3
@@ -112,7 +113,7 @@ def test_oscillator_between_two_states(mass):
     assert solution.objective == pytest.approx(1.0562831359694393 * mass**2, rel=1e-10)
     np.testing.assert_allclose(solution.force[[0, -1], 0] / mass, [-1.17613037, 1.53178724], rtol=0, atol=1e-8)
     # a boundary position stands as a bound: its multiplier is minus the slope of the optimum, a density in time
-    bounds = solution.path.multipliers["node:column:position"][[0, -1], 0] * end_weight(solution)
+    bounds = solution.path.multipliers[POSITION_BOUNDS][[0, -1], 0] * end_weight(solution)
     expected = np.array([1.32136731, -0.34407892]) * mass**2
     np.testing.assert_allclose(-bounds * [1, -1], expected, rtol=0, atol=1e-8 * mass**2)
 
@@ -221,7 +222,7 @@ def test_kepler_transfer_of_least_effort(indirect, mass):
     assert solution.objective == pytest.approx(objective * mass**2, rel=1e-8)
     np.testing.assert_allclose(solution.costate[0] / mass**2, costates[2:], rtol=0, atol=1e-8)
     np.testing.assert_allclose(-solution.force[0] / mass, costates[2:], rtol=0, atol=1e-8)
-    bounds = solution.path.multipliers["node:column:position"][0] * end_weight(solution)
+    bounds = solution.path.multipliers[POSITION_BOUNDS][0] * end_weight(solution)
     np.testing.assert_allclose(-bounds / mass**2, costates[:2], rtol=0, atol=1e-8)
 
 
@@ -246,7 +247,7 @@ def test_costate_is_minus_mass_times_mean_force_where_forces_are_held():
 def test_rotation_keeps_a_quantity_of_the_optimum(order, hold):
     """x cross lambda_x + v cross lambda_v is the same at both ends on any mesh, as gravity has no angle."""
     solution = solve(kepler_transfer(), order=order, steps=12, hold=hold).raise_for_status()
-    bounds = solution.path.multipliers["node:column:position"][[0, -1]] * end_weight(solution)
+    bounds = solution.path.multipliers[POSITION_BOUNDS][[0, -1]] * end_weight(solution)
     costates_r = -bounds * np.array([[1], [-1]])
     costates_v = solution.costate[[0, -1]]
     states = np.array([[end.position, end.velocity] for end in (solution.problem.start, solution.problem.goal)])

@@ -1,4 +1,4 @@
-"""The layout of a problem's unknowns and rows on a mesh, and the blocks that fill it."""
+"""Where the stencils of a problem stand on a mesh: the layout of unknowns and rows, and the blocks in it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,25 @@ from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
-from dmoc.nlp.stencils import AXES, Stencil, formulas_of
+from dmoc.nlp.stencils import AXES, Limit, Stencil, Stencils
+from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
 
 
-class Transcript:
-    """The formulas of one problem, put on one mesh."""
+class Placement:
+    """The stencils of one problem, put on one mesh."""
 
-    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, mesh: np.ndarray, units: Any):
+    def __init__(
+        self,
+        problem: TransferProblem,
+        stencils: Stencils,
+        rule: Scheme,
+        hold: bool,
+        mesh: np.ndarray,
+        units: Units,
+    ):
         self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
-        formulas = formulas_of(problem, rule.order, hold)
-        self.parameter_count = formulas.parameter_count
         self.steps = len(mesh) - 1
         self.counts = {"node": self.steps * rule.degree + 1, "step": self.steps, "ends": 1}
         self.columns = self._columns()
@@ -30,15 +37,15 @@ class Transcript:
         self._lower: list[np.ndarray] = []
         self._upper: list[np.ndarray] = []
         impulse = problem.mass / (units.force * units.time)
-        axes = [Row(axis, 0, 0.0, 0.0) for axis in AXES[: problem.dimension]]
-        self._add_rows("dynamics", "smooth", axes, self.counts["node"], impulse)
+        axes = tuple(Row(axis, 0, 0.0, 0.0) for axis in AXES[: problem.dimension])
+        self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
         numbers = {
             "fraction": node_fractions(mesh, rule),
             "weight": node_weights(mesh, rule),
             "begin": mesh[:-1],
             "length": np.diff(mesh),
         }
-        self.blocks = [self._block(stencil, numbers) for stencil in formulas.stencils]
+        self.blocks = [self._block(stencil, numbers) for stencil in stencils.stencils]
 
     @property
     def row_bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -57,18 +64,19 @@ class Transcript:
         columns = columns.add("goal.velocity", "end", axes, 1, speed)
         return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
 
-    def _add_rows(self, name: str, kind: str, rows: Sequence[Row], count: int, scale: Any) -> None:
-        self.rows = self.rows.add(name, kind, [row.name for row in rows], count, scale)
+    def _add_rows(self, limit: Limit, count: int, scale: Any) -> None:
+        labels, units = [row.name for row in limit.rows], [row.unit for row in limit.rows]
+        self.rows = self.rows.add(limit.name, limit.kind, labels, count, scale, limit.owner, units)
         scales = self.rows.groups[-1].scales
-        self._lower.append((np.array([row.lower for row in rows]) * scales).ravel())
-        self._upper.append((np.array([row.upper for row in rows]) * scales).ravel())
+        self._lower.append((np.array([row.lower for row in limit.rows]) * scales).ravel())
+        self._upper.append((np.array([row.upper for row in limit.rows]) * scales).ravel())
 
     def _block(self, stencil: Stencil, numbers: dict[str, np.ndarray]) -> Block:
         """A stencil with its places on the mesh, after its own rows have been added to the layout."""
         units, count = self.units, self.counts[stencil.every]
         sizes = {"": 1.0, "m": units.length, "m/s": units.length / units.time, "kg": units.mass}
-        for name, kind, rows in stencil.limits:
-            self._add_rows(name, kind, rows, count, np.array([[1 / sizes[row.unit] for row in rows]]))
+        for limit in stencil.limits:
+            self._add_rows(limit, count, np.array([[1 / sizes[row.unit] for row in limit.rows]]))
 
         def stacked(layout: Layout, places: Sequence[tuple[str, slice]]) -> np.ndarray:
             found = [layout[group].indices[:, at] for group, at in places]

@@ -1,0 +1,329 @@
+"""One transfer problem on one mesh as Ipopt sees it: bounds, parameters, names, and the way there and back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import of_kind
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import Scheme
+from dmoc.motion.march import force_of
+from dmoc.motion.mesh import node_weights
+from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import DiscretePath, Key
+from dmoc.nlp.assembly import Assembly
+from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
+from dmoc.nlp.layout import Group, Layout
+from dmoc.nlp.settings import settings_for
+from dmoc.nlp.units import Units
+from dmoc.parts.rows import values_of
+from dmoc.results.facts import Level, Provenance
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+
+# (order, steps, iteration, objective, name of the worst row, its scaled violation) -> whether to stop
+Progress = Callable[[int, int, int, float, str, float], bool | None]
+
+
+@dataclass(frozen=True)
+class NLP:
+    """One transfer problem on one mesh, as Ipopt sees it.
+
+    Start, goal, mass, limits and times are bounds and parameters: `bounds(problem)` and
+    `parameters(problem)` give them for any problem that `accepts` lets through, without a rebuild.
+    """
+
+    problem: TransferProblem
+    dynamics: Dynamics
+    scheme: Scheme
+    hold: bool
+    mesh: np.ndarray
+    units: Units
+    columns: Layout
+    rows: Layout
+    row_bounds: tuple[np.ndarray, np.ndarray]
+    assembly: Assembly
+
+    def accepts(self, problem: TransferProblem) -> None:
+        """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""
+        old = self.problem
+
+        def each(alike: Callable, new: tuple, known: tuple) -> bool:
+            return len(new) == len(known) and all(map(alike, new, known))
+
+        same = {
+            "dimension": problem.dimension == old.dimension,
+            "effects": each(_equal, problem.effects, old.effects),
+            "actuator": _built_alike(problem.actuator, old.actuator),
+            "objective": _equal(problem.objective, old.objective),
+            "constraints": each(_built_alike, problem.constraints, old.constraints),
+            "free duration": problem.free_duration == old.free_duration,
+            "start": _built_alike(problem.start, old.start),
+            "goal": _built_alike(problem.goal, old.goal),
+        }
+        if changed := [name for name, equal in same.items() if not equal]:
+            raise ValueError(f"this NLP was built for another {', '.join(changed)}; transcribe the new problem")
+
+    def parameters(self, problem: TransferProblem) -> np.ndarray:
+        """The NLP's parameter vector for a problem [SI]."""
+        fixed = [] if problem.free_duration else [problem.duration_bounds[0]]
+        head = [*self.units.origin, problem.start_time, problem.mass, *fixed]
+        return np.concatenate([head, *[values_of(part) for part in problem.adjustable_parts]])
+
+    def bounds(self, problem: TransferProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of the unknowns, then of the rows."""
+        lower, upper = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
+
+        def put(name: str, low, high) -> None:
+            group = self.columns[name]
+            lower[group.start : group.stop] = np.broadcast_to(low, (group.count, len(group.labels))).ravel()
+            upper[group.start : group.stop] = np.broadcast_to(high, (group.count, len(group.labels))).ravel()
+
+        n, origin = problem.dimension, self.units.origin
+        boxes = [constraint.bounds(n) for constraint in problem.constraints]
+        put("position", *(np.array(side) - origin for side in _intersection(boxes, n)))
+        put("force", *problem.actuator.bounds(n))
+        if problem.free_duration:
+            put("duration", *problem.duration_bounds)
+        if problem.actuator.burns:
+            put("mass", problem.actuator.dry_mass, np.inf)
+            lower[self.columns["mass"].start] = upper[self.columns["mass"].start] = problem.mass
+        for end, name, place in ((problem.start, "start", 0), (problem.goal, "goal", -1)):
+            position, velocity = end.fixed()
+            places = self.columns["position"].indices[:, place]
+            _fix(lower, upper, places, position - origin)
+            _fix(lower, upper, self.columns[f"{name}.velocity"].indices[:, 0], velocity)
+        scale = self.columns.scales()
+        low, high = (side.copy() for side in self.row_bounds)
+        self._release(problem, low, high)
+        return lower / scale, upper / scale, low, high
+
+    def _release(self, problem: TransferProblem, low: np.ndarray, high: np.ndarray) -> None:
+        """Free the limits on a boundary state that is fixed as a whole: nothing is left there to move.
+
+        Whether such a state keeps the limits is checked when the problem is made.
+        """
+        for end, place in (("start", 0), ("goal", -1)):
+            position, velocity = getattr(problem, end).fixed()
+            for group in self.rows.groups:
+                if group.kind == "node" and not np.isnan(position).any():
+                    low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
+                if group.owner and group.owner.end == end and not np.isnan(velocity).any():
+                    low[group.indices], high[group.indices] = -np.inf, np.inf
+
+    def objective(self, scaled: float) -> float:
+        """The objective in its own unit and sign."""
+        return self.problem.objective.sense * scaled * self.units.cost
+
+    def scaled(self, values: Mapping[str, Any], flat: Callable, join: Callable) -> Any:
+        """Scaled unknowns from the SI values of each group, of any kind that `flat` and `join` put in a row.
+
+        `values` may be arrays of shape (count, components) with NumPy's functions, or CasADi matrices of
+        shape (components, count) with CasADi's: in memory both have the components of one index together.
+        """
+        return join([flat(values[group.name]) for group in self.columns.groups]) / join([self.columns.scales()])
+
+    def pack(self, path: DiscretePath) -> np.ndarray:
+        """Scaled unknowns of a path that stands on this mesh."""
+        values = {
+            "position": path.position - self.units.origin,
+            "force": path.control,
+            "mass": path.mass,
+            "start.velocity": path.start_velocity,
+            "goal.velocity": path.goal_velocity,
+            "duration": path.duration,
+        }
+        return self.scaled(values, np.ravel, np.concatenate)
+
+    def unpack(self, x: np.ndarray, problem: TransferProblem) -> DiscretePath:
+        """SI path of scaled unknowns."""
+        values = np.asarray(x).ravel() * self.columns.scales()
+        get = {group.name: group.of(values) for group in self.columns.groups}
+        nodes = self.columns["position"].count
+        return DiscretePath(
+            self.mesh,
+            self.scheme.order,
+            self.hold,
+            float(get["duration"].item()) if "duration" in get else problem.duration_bounds[0],
+            get["position"] + self.units.origin,
+            get["force"],
+            get["mass"][:, 0] if "mass" in get else np.full(nodes, problem.mass),
+            get["start.velocity"][0],
+            get["goal.velocity"][0],
+        )
+
+    def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
+        """Key, group and the SI value of a scaled multiplier of 1, of every group.
+
+        A multiplier that stands once a node or a step is a density: over its share of the duration.
+        """
+        shares = {"node": node_weights(self.mesh, self.scheme), "step": np.diff(self.mesh)}
+        shares["control"] = shares["step" if self.hold else "node"]
+        for layout, side in ((self.columns, "column"), (self.rows, "row")):
+            for group in layout.groups:
+                share = shares.get(group.kind, np.ones(group.count))[:, None]
+                scale = 1 / group.scales if side == "column" else group.scales
+                yield Key(group.kind, side, group.name), group, self.units.cost * scale / share
+
+    def path(self, problem: TransferProblem, answer: Answer) -> DiscretePath:
+        """SI path and multipliers of an answer."""
+        sides = {"column": answer.lam_x, "row": answer.lam_g}
+        multipliers = {key: group.of(sides[key.side]) * unit for key, group, unit in self.densities()}
+        return replace(self.unpack(answer.x, problem), multipliers=multipliers)
+
+    def multipliers(self, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled multipliers of unknowns and rows; 0 where a path has none."""
+        sides = {"column": np.zeros(self.columns.size), "row": np.zeros(self.rows.size)}
+        for key, group, unit in self.densities():
+            if key in path.multipliers:
+                sides[key.side][group.start : group.stop] = (path.multipliers[key] / unit).ravel()
+        return sides["column"], sides["row"]
+
+    def violations(
+        self, problem: TransferProblem, x: Any, g: Any, count: int = 10
+    ) -> list[tuple[Group, int, float]]:
+        """The most violated rows and bounds, worst first: group, place in its layout, scaled violation."""
+        lbx, ubx, lbg, ubg = self.bounds(problem)
+        excess = [
+            np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)
+            for value, low, high in ((np.ravel(g), lbg, ubg), (np.ravel(x), lbx, ubx))
+        ]
+        both, rows = np.concatenate(excess), self.rows.size
+        worst = [int(place) for place in np.argsort(-both)[:count] if both[place] > 0]
+        places = [(self.rows, i) if i < rows else (self.columns, i - rows) for i in worst]
+        return [
+            (layout.group_at(at), at, float(both[i])) for i, (layout, at) in zip(worst, places, strict=True)
+        ]
+
+    def solver(
+        self,
+        options: dict[str, Any] | None = None,
+        warm: bool = False,
+        carried: bool = False,
+        watch: Watch | None = None,
+    ) -> ca.Function:
+        """Ipopt for this NLP; `warm` and `carried` as in `settings_for`."""
+        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried)
+        return make_solver(self.assembly, settings, options, watch)
+
+    def watch(self, problem: TransferProblem, progress: Progress | None, interrupt: Interrupt) -> Watch:
+        """A watch over the iterations that tells `progress` of each in the problem's own words."""
+
+        def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
+            worst = self.violations(problem, x, g, count=1)
+            name, size = (worst[0][0].name_of(worst[0][1]), worst[0][2]) if worst else ("", 0.0)
+            steps = len(self.mesh) - 1
+            return bool(progress(self.scheme.order, steps, iteration, self.objective(objective), name, size))  # type: ignore[misc]
+
+        sizes = self.columns.size, self.rows.size, self.assembly.p.numel()
+        return Watch(*sizes, tell if progress else None, interrupt)
+
+    def run(self, solver: ca.Function, problem: TransferProblem, path: DiscretePath) -> Answer:
+        """Solve for a problem that `accepts` lets through, from a path on this mesh."""
+        lbx, ubx, lbg, ubg = self.bounds(problem)
+        lam_x, lam_g = self.multipliers(path)
+        bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
+        x0 = np.clip(self.pack(path), lbx, ubx)
+        return run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
+
+    def level(self, answer: Answer, build_s: float) -> Level:
+        """What one run took, for the ladder."""
+        return Level(
+            order=self.scheme.order,
+            steps=len(self.mesh) - 1,
+            iterations=answer.iterations,
+            objective=self.objective(answer.objective),
+            build_s=build_s,
+            solve_s=answer.seconds,
+            status=answer.status,
+            evaluations=answer.evaluations,
+        )
+
+    def solution(
+        self,
+        problem: TransferProblem,
+        answer: Answer,
+        ladder: tuple[Level, ...],
+        message: str,
+        options: dict[str, Any] | None = None,
+        **found: Any,
+    ) -> Solution:
+        """An answer as a Solution; `found` are further fields of it."""
+        path = self.path(problem, answer)
+        momentum, velocity = end_momenta(self.dynamics, path, problem.start_time)
+        return Solution(
+            problem=problem,
+            path=path,
+            velocity=velocity,
+            momentum=momentum,
+            force=force_of(self.dynamics, path.control),
+            objective=self.objective(answer.objective),
+            success=answer.status == "solved",
+            status=answer.status,
+            message=message,
+            ladder=ladder,
+            provenance=Provenance.of(problem, options),
+            **found,
+        )
+
+    def solve(
+        self, problem: TransferProblem | None = None, guess: Any = None, options: dict[str, Any] | None = None
+    ) -> Solution:
+        """Solve again without a rebuild, for a problem that differs in states, mass, limits or times.
+
+        One run of Ipopt on this mesh, for closed loops and families of problems; `dmoc.solve` goes from
+        coarse to fine and says why there is no path.
+
+        Parameters
+        ----------
+        problem : TransferProblem
+            One that this NLP `accepts`; its own if not given.
+        guess
+            As in `dmoc.solve`; a former Solution on the same mesh starts warm, with its multipliers.
+        options : dict
+            CasADi `nlpsol` options.
+
+        Raises
+        ------
+        ValueError
+            By name, if the problem differs in more than that.
+        """
+        new = self.problem if problem is None else of_kind("problem", problem, TransferProblem)
+        self.accepts(new)
+        begun = time.perf_counter()
+        path = starting_guess(new, self.mesh, self.scheme.order, self.hold, guess)
+        solver = self.solver(options, warm=bool(path.multipliers))
+        built = time.perf_counter() - begun
+        answer = self.run(solver, new, path)
+        words = "a local optimum" if answer.status == "solved" else STATUSES[answer.status].advice
+        return self.solution(new, answer, (self.level(answer, built),), words, options)
+
+
+def _built_alike(new: Any, old: Any) -> bool:
+    """Whether two parts make the same rows; a user's own may build in what it does not call adjustable."""
+    structure = [(type(part), getattr(part, "structure", None)) for part in (new, old)]
+    open_to_change = type(new).__module__.startswith("dmoc.") or new.adjustable
+    return structure[0] == structure[1] and (open_to_change or _equal(new, old))
+
+
+def _equal(new: Any, old: Any) -> bool:
+    """Equal in fields and in what a user's own class has beside those that it inherits."""
+    return type(new) is type(old) and vars(new) == vars(old)
+
+
+def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
+    known = ~np.isnan(values)
+    lower[places[known]] = upper[places[known]] = values[known]
+
+
+def _intersection(boxes: list, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+    lower = np.max([low for low, _ in boxes] or [np.full(dimension, -np.inf)], axis=0)
+    upper = np.min([high for _, high in boxes] or [np.full(dimension, np.inf)], axis=0)
+    return lower, upper

@@ -1,0 +1,83 @@
+"""Canonical units of a problem near a path, in which Ipopt sees numbers near 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.memory import remembered
+from dmoc.motion.dynamics import state_symbols
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.problem import TransferProblem
+
+# The size of the objective is taken from this many nodes: more do not change its first digit.
+SAMPLED = 400
+# A force used in a solution is taken as the unit down to this part of the limit.
+LEAST_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Units:
+    """Canonical units [m, s, N, kg, unit of the objective] and the origin [m]; Ipopt sees numbers near 1."""
+
+    length: float
+    time: float
+    force: float
+    mass: float
+    cost: float
+    origin: np.ndarray
+
+
+def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
+    """Canonical units of a problem near a path.
+
+    Length: extent of the path, origin at its centre. Time: the duration. Force: the largest used
+    where a solution is known, else the limit, else what moves the mass that far in that time, or without
+    effects what turns it round.
+    Cost: what the objective is on the path, or would be with the unit of force all the way.
+    """
+    low, high = guess.position.min(axis=0), guess.position.max(axis=0)
+    time = guess.duration
+    speed = max(np.abs(guess.start_velocity).max(), np.abs(guess.goal_velocity).max())
+    length = guess.diagonal or float(speed * time) or 1.0
+    change = length / time
+    if not problem.effects:
+        # nothing else turns the body round
+        mean = (guess.position[-1] - guess.position[0]) / time
+        turns = np.array([guess.start_velocity, guess.goal_velocity]) - mean
+        change = max(change, float(np.linalg.norm(turns, axis=1).max()))
+    typical = problem.mass * change / time
+    limit = problem.actuator.force_limit()
+    force = float(np.abs(guess.control).max(initial=0.0)) if guess.multipliers else 0.0
+    if limit is not None:
+        force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
+    force = force or typical
+    cost = max(abs(_cost(problem, guess, 0.0)), abs(_cost(problem, guess, force))) or 1.0
+    return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
+
+
+def _cost(problem: TransferProblem, guess: DiscretePath, force: float) -> float:
+    """About the objective along a guess, with `force` [N] in place of its controls if that is not zero."""
+    parts = problem.dimension, problem.objective, problem.actuator
+    rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
+    some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
+    times = problem.start_time + guess.duration * guess.fractions[some]
+    velocity = np.gradient(guess.position[some], times, axis=0)
+    nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
+    control = guess.control[np.minimum(nodes, len(guess.mesh) - 2)] if guess.hold else guess.control[some]
+    control = np.full_like(control, force) if force else control
+    rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
+    end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
+    return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
+
+
+def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
+    """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
+    t, q, v, m = state_symbols(problem.dimension)
+    u = ca.SX.sym("u", problem.actuator.size(problem.dimension))
+    rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
+    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
+    return ca.Function("rate", [t, q, v, u, m], [rate]), terminal

@@ -1,0 +1,94 @@
+"""How far off an answer is: steps integrated again, changes from mesh to mesh, an independent integrator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights, step_nodes
+from dmoc.motion.momenta import end_momenta
+from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
+from dmoc.motion.reference import reference
+from dmoc.motion.step import step_map
+from dmoc.results.facts import Error
+from dmoc.scene.problem import TransferProblem
+
+# By how much the error falls from mesh to mesh, at least.
+LEAST_FALL = 1.5
+
+
+TINY = float(np.finfo(float).tiny)
+
+
+def change(
+    coarse: tuple[DiscretePath, float], fine: tuple[DiscretePath, float], parts: np.ndarray
+) -> tuple[float, float]:
+    """Relative change of path and objective from one mesh to the next, at the step ends they share."""
+    shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
+    moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max()
+    stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
+    scale = max(abs(fine[1]), TINY)
+    return max(float(moved) / path_scales(fine[0])[0], stretched), abs(fine[1] - coarse[1]) / scale
+
+
+def estimate(
+    problem: TransferProblem,
+    dynamics: Dynamics,
+    path: DiscretePath,
+    changes: list[tuple[float, float]],
+    most: float,
+) -> Error:
+    """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
+
+    Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
+    f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
+    """
+    fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
+    moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
+    extent, speed = path_scales(path)
+    position, velocity = reference(dynamics, path, problem.start_time, path.start_velocity)
+    miss = np.linalg.norm(position - path.position[-1]) / extent
+    slip = np.linalg.norm(velocity - path.goal_velocity) / speed
+    return Error(moved, cost, float(max(miss, slip)))
+
+
+def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
+    """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
+
+    The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
+    e / sqrt(|F|^2 + e^2) by e, and its multipliers are the derivatives of the objective.
+    """
+    width, density = problem.actuator.smoothing, path.multipliers.get(ACTUATOR_ROWS)
+    if width is None or density is None:
+        return 0.0
+    weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
+    force = np.linalg.norm(path.control[:, : problem.dimension], axis=1) / problem.actuator.force_limit()
+    return float(abs(weights * density[:, 0] @ (width**2 / np.hypot(force, width))))
+
+
+def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
+    """Error of every step by integrating it again with two halves of order 8, over extent and speed [-]."""
+    rule, fine = scheme(path.order), scheme(8)
+    n, steps = dynamics.dimension, len(path.mesh) - 1
+    momentum, _ = end_momenta(dynamics, path, start_time)
+    extent, speed = path_scales(path)
+    states = np.concatenate([path.position[:: rule.degree], momentum], axis=1)
+    now = states[:-1]
+    at = step_nodes(steps, rule)
+    h = path.duration * np.diff(path.mesh)
+    origin, march = path.position[0], step_map(dynamics, fine, path.hold).map(steps)
+    for half in (0, 1):
+        fractions = 0.5 * (half + fine.points)
+        # controls of one step stand side by side: axis first, then node, then step
+        control = path.control.T
+        if not path.hold:
+            control = np.einsum("ij,jkn->nki", rule.values_at(fractions), path.control[at])
+            control = control.reshape(control.shape[0], -1)
+        mass = rule.values_at(fractions) @ path.mass[at]
+        times = start_time + path.duration * path.mesh[:-1] + 0.5 * half * h
+        q, p = (now[:, :n] - origin).T, now[:, n:].T
+        moves = march(q, p, mass, control, times[None], 0.5 * h[None], origin)
+        now = now + np.array(np.vstack([np.array(moves[0]), np.array(moves[1])])).T
+    gap = np.abs(states[1:] - now) / np.repeat([extent, speed], n)
+    return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)

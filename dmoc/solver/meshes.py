@@ -1,0 +1,171 @@
+"""How many steps, of which order, on which mesh: every choice that the user leaves open is made here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.guess.coast import MANY_TURNS
+from dmoc.guess.starting import angle_around, starting_guess
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.stability import flow_matrices
+from dmoc.nlp.transcription import check_mesh
+from dmoc.scene.problem import TransferProblem
+
+# Steps of the last mesh at each order: about as many as reach 1e-4 to 1e-6 on a smooth transfer.
+DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
+# Steps a revolution at each order, where there are many revolutions. At order 2 they are times the root of
+# their number, since errors of the phase add up: after n revolutions in N steps the goal of `geo_raise` is
+# missed by 141 n^3 / N^2 of the path.
+A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
+# Order over many revolutions, if none is asked for.
+ORDER_OF_MANY_TURNS = 6
+# Order where equal steps would be too long near an attractor, if none is asked for.
+ORDER_OF_UNEVEN = 4
+
+# Nodes of the coarsest mesh with limits, which take many iterations, and without them: then 400 nodes take
+# no longer than 100 and 400 after them.
+COARSEST_NODES = {True: 100, False: 400}
+# How many times finer each next mesh is, with limits and without.
+FINER = {True: 4, False: 16}
+# Order of the coarse mesh without limits: all is smooth there, and it is nearer the answer than finer meshes
+# of order 2.
+SMOOTH_ORDER = 6
+# A coarse mesh has no more nodes than this to keep h omega below 1: where a guess strays far off, its rates
+# mean nothing.
+MOST_COARSE = 400
+# Steps of order 2 over the number of revolutions to the power 1.5, for a phase that is roughly right.
+IN_PHASE = 50
+# The rounding of |F| on the coarsest mesh, as a part of the largest thrust.
+WIDEST_ROUNDING = 1e-2
+
+# Order and steps of the trial that a tolerance begins with.
+TRIAL_ORDER = 4
+TRIAL_STEPS = 20
+
+# Equal steps are too long where the rate of the motion around attractors varies by more than this factor.
+UNEVEN = 5.0
+# Places at which that rate is looked at.
+SAMPLES = 1000
+# A guess with more nodes than this is made on this many and interpolated ...
+GUESSED = 2000
+# ... if that leaves at least this many nodes a revolution.
+NODES_A_TURN = 100
+
+
+def first_path(
+    problem: TransferProblem,
+    order: int | None = None,
+    steps: int | None = None,
+    hold: bool = False,
+    guess: Any = None,
+    mesh: Any = None,
+) -> DiscretePath:
+    """The guess on the last mesh; order and steps that are not given are those that the motion needs."""
+    ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
+    first = guess_on(problem, ends, order or 2, hold, guess)
+    if mesh is not None:
+        return first
+    turns = angle_around(problem, first) / (2 * np.pi)
+    if steps is None and turns > MANY_TURNS:
+        order = order or (2 if hold else ORDER_OF_MANY_TURNS)
+        steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
+        first = starting_guess(problem, check_mesh(steps), order, hold, guess)
+    if is_uneven(problem, first):
+        order = order or (2 if hold else ORDER_OF_UNEVEN)
+        return graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
+    return first
+
+
+def trial_path(
+    problem: TransferProblem, order: int, steps: int | None, hold: bool, guess: Any = None
+) -> DiscretePath:
+    """A guess for the trial of a tolerance, with as many steps as the motion along it needs."""
+
+    def on(count: int) -> DiscretePath:
+        first = starting_guess(problem, check_mesh(count), order, hold, guess)
+        return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
+
+    first = on(steps or TRIAL_STEPS)
+    enough = 2 * least_steps(problem, first)
+    return on(enough) if steps is None and enough > TRIAL_STEPS else first
+
+
+def guess_on(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
+) -> DiscretePath:
+    """A starting guess; with very many steps made on fewer that follow its revolutions as well, and carried."""
+    fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
+    if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
+        found = starting_guess(problem, fewer, order, hold)
+        if angle_around(problem, found) < 2 * np.pi * GUESSED / NODES_A_TURN:
+            return found.onto(mesh, order, hold)
+    return starting_guess(problem, mesh, order, hold, given)
+
+
+def is_uneven(problem: TransferProblem, path: DiscretePath) -> bool:
+    """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
+    rates = problem.attraction.rates(path.position)
+    return bool(rates.max() > UNEVEN * rates.min())
+
+
+def graded_guess(
+    problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
+) -> DiscretePath:
+    """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
+    fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
+    rates = problem.attraction.rates(fine.position)
+    angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
+    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
+    return starting_guess(problem, mesh, order, hold, given)
+
+
+def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, list[np.ndarray]]:
+    """The order of the coarse meshes, and all meshes up to that of a first guess.
+
+    The coarsest has 100 or 400 nodes, or as many as keep h omega below 1 on the guess: a mesh that
+    cannot follow the motion has optima of its own. Over many revolutions that takes more at order 2,
+    where errors of the phase add up.
+    """
+    final, limited = first.mesh, problem.limited
+    order = first.order if limited or first.hold else max(first.order, SMOOTH_ORDER)
+    counts, least = [(len(final) - 1) * (first.order // 2)], COARSEST_NODES[limited]
+    if counts[0] > 2 * least:
+        turns = angle_around(problem, first) / (2 * np.pi) if order == 2 else 0.0
+        least = max(least, order // 2 * least_steps(problem, first), int(IN_PHASE * turns**1.5))
+    while counts[-1] > 2 * least:
+        counts.append(max(least, -(-counts[-1] // FINER[limited])) if order == first.order else least)
+    places = np.linspace(0.0, 1.0, len(final))
+    steps = [count // (order // 2) for count in reversed(counts[1:])]
+    return order, [*(np.interp(uniform_mesh(count), places, final) for count in steps), final]
+
+
+def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
+    """Steps that keep h omega below 1 along a path, omega the fastest rate of the linearised motion."""
+    sample = path.onto(uniform_mesh(min(100, len(path.mesh) - 1)), 2, path.hold)
+    slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
+    flow, _ = flow_matrices(Dynamics.of(problem), sample, problem.start_time, slopes)
+    rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full(1, np.inf)
+    # A mode that dies out need not be followed.
+    fastest = max(rates.real.max(), np.abs(rates.imag).max())
+    return int(np.clip(path.duration * fastest, 2, MOST_COARSE))
+
+
+def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:
+    """The meshes, each with the rounding of |F| at zero: wide on the coarse ones, as asked for on the last."""
+    if rounding is None:
+        return [(mesh, None) for mesh in meshes]
+    count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / rounding))), 0)
+    widths = [WIDEST_ROUNDING * 0.1**i for i in range(count)] + [rounding]
+    repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
+    return list(zip(repeated, widths + [rounding] * (len(meshes) - len(widths)), strict=True))
+
+
+def with_as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:
+    """The mesh of a path for another order, with about as many nodes and at least eight steps."""
+    steps = max(8, (len(path.mesh) - 1) * path.order // order)
+    places = np.linspace(0.0, 1.0, len(path.mesh))
+    return path.mesh if order == path.order else np.interp(np.linspace(0.0, 1.0, steps + 1), places, path.mesh)

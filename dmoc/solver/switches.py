@@ -1,0 +1,91 @@
+"""Where controls switch and limits set in along a path."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from dmoc.motion.dynamics import state_symbols
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key, path_scales
+from dmoc.scene.problem import TransferProblem
+
+# A control within this share of its span of a limit is at the limit; so many nodes between make an arc.
+BETWEEN = 0.05
+# A control jumps where it changes by more than this part of its span from one step end to the next ...
+JUMP = 0.2
+# ... and by more than this many times what it changes beside.
+STEEPER = 3
+# A limit acts in a step if loosening it by its own size would change the objective by this part of it ...
+ACTS = 1e-6
+# ... and by this part of the largest such change: the barrier leaves something beside a limit that acts.
+BARRIER = 1e-3
+
+
+def is_singular(problem: TransferProblem, path: DiscretePath) -> bool:
+    """Whether controls that the cost is linear in stay between their limits for longer than a switch takes.
+
+    On such arcs a control at the inner nodes of a step is not determined, and wanders.
+    """
+    share = _shares(problem, path)
+    between = np.any((share > BETWEEN) & (share < 1 - BETWEEN), axis=1)
+    inside = between[1:-1] & between[:-2] & between[2:]
+    return bool(inside.sum() > BETWEEN * len(inside))
+
+
+def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    """When a control that the cost is linear in passes the middle between its limits [s]."""
+    fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
+    above = _shares(problem, path) - 0.5
+    node, column = np.nonzero(np.diff(above > 0, axis=0))
+    before, after = above[node, column], above[node + 1, column]
+    at = fractions[node] + before / (before - after) * (fractions[node + 1] - fractions[node])
+    return problem.start_time + path.duration * np.sort(at)
+
+
+def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
+    u = ca.SX.sym("u", path.control.shape[1])
+    rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
+    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
+    limited = np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
+    return (path.control - lower)[:, limited] / (upper - lower)[limited]
+
+
+def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:
+    """Steps in which a control jumps or a limit sets in or lets go: there higher derivatives jump.
+
+    A limit acts in a step if loosening it by its own size would change the objective by a millionth.
+    A throttle with |F| rounded at zero never quite reaches its lower limit: there only jumps count.
+    """
+    extent, _ = path_scales(path)
+    limit = 0.0 if problem.actuator.smoothing is not None else problem.actuator.force_limit() or 0.0
+    sizes = {Key("control", "column", "force"): limit, POSITION_BOUNDS: extent}
+    found, steps = [control_jumps(problem, path)], len(path.mesh) - 1
+    for key, density in path.multipliers.items():
+        if key.kind not in ("node", "control", "step"):
+            continue
+        share = np.abs(density).max(axis=1) / len(density) * sizes.get(key, 1.0)
+        if key == POSITION_BOUNDS:
+            share[[0, -1]] = 0.0
+        if len(share) > steps:
+            share = share[step_nodes(steps, scheme(path.order))].max(axis=0)
+        # what the barrier leaves beside a limit that acts is no part of it
+        acts = (share > ACTS * abs(objective)) & (share > BARRIER * share.max())
+        found.append(np.flatnonzero(np.diff(acts)))
+    return np.unique(np.concatenate(found))
+
+
+def control_jumps(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    """Steps within which a limited control goes from near one of its limits to near another."""
+    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
+    control = path.control
+    if problem.actuator.force_limit() is None or len(control) < 3:
+        return np.empty(0, int)
+    span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.force_limit() or 1.0))
+    ends = control if path.hold else control[:: path.order // 2]
+    change = (np.abs(np.diff(ends, axis=0)) / span).max(axis=1)
+    # a jump takes one step, or two with a node in its middle; what goes on beyond them is a steep slope
+    around = np.pad(change, 2)
+    return np.flatnonzero((change > JUMP) & (change > STEEPER * np.maximum(around[:-4], around[4:])))
