@@ -106,15 +106,15 @@ def _zones(case: Case) -> Iterable[Excess]:
     still = np.zeros_like(path)
     for i, constraint in enumerate(case.problem.constraints):
         name = f"{type(constraint).__name__} {i + 1}"
-        if constraint.unit == "m/s":
+        if constraint.limits_speed:
             allowed = BOUND * case.speed + min(sway, DEEPEST * case.speed)
             yield Excess(name, _most(constraint.excess(path, velocity)), allowed, "m/s")
             continue
         at_nodes = _most(constraint.excess(case.position, case.node_velocity))
         yield Excess(f"{name} at nodes", at_nodes, BOUND * case.extent, constraint.unit)
-        radius = getattr(constraint, "radius", None)
-        cut = longest**2 / (8 * radius) if radius else _most(constraint.excess(chord, still))
-        cut = min(cut + bend, DEEPEST * min(radius or np.inf, case.extent))
+        size = constraint.feature()
+        cut = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
+        cut = min(cut + bend, DEEPEST * min(size, case.extent))
         between = _most(constraint.excess(path, still))
         yield Excess(f"{name} between nodes", between, BOUND * case.extent + cut, constraint.unit)
 
@@ -127,7 +127,7 @@ def _between(case: Case, longest: float) -> tuple[np.ndarray, ...]:
     """
     q, v = case.position, case.node_velocity
     tau = case.path.duration * np.diff(case.path.fractions)[:, None, None]
-    smallest = min(getattr(constraint, "radius", np.inf) for constraint in case.problem.constraints)
+    smallest = min(constraint.feature() for constraint in case.problem.constraints)
     parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_SAMPLES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
     mean = np.diff(q, axis=0)[:, None] / tau

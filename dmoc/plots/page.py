@@ -9,9 +9,7 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import path_of, whole_file
-from dmoc.parts.engines import Nozzles
-from dmoc.parts.objectives import Objective, Time
-from dmoc.parts.speed import SpeedLimit
+from dmoc.parts.objectives import Objective
 from dmoc.plots.ledger import draw_ledger
 from dmoc.plots.path import burning, draw_path, entries_once, is_wide
 from dmoc.plots.style import (
@@ -163,8 +161,8 @@ def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) ->
         sides = np.unique(np.concatenate([side[:n] for side in actuator.bounds(n)]))
         if np.isfinite(sides).any():
             levels, words = sides, "limit" if n == 1 else "limit of\na component"
-    elif isinstance(actuator, Nozzles):
-        words = "limit of\na nozzle"
+    else:
+        words = actuator.limit_label
     largest = np.abs(solution.force).max(initial=0.0)
     for level in levels[np.isfinite(levels)]:
         if abs(level) < FAR * largest:
@@ -177,9 +175,9 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     times, speed = speeds(solution)
     size, unit = readable(speed, "m/s")
     axes.plot(times / late, speed / size, color=PATH, label="speed")
-    for limit in solution.problem.constraints if solution.problem else ():
-        if isinstance(limit, SpeedLimit):
-            axes.axhline(limit.limit / size, label="limit", **LIMIT)
+    for constraint in solution.problem.constraints if solution.problem else ():
+        if (limit := constraint.largest_speed()) is not None:
+            axes.axhline(limit / size, label="limit", **LIMIT)
     if np.nanmin(speed) < 0.5 * np.nanmax(speed):
         # above that the changes are what there is to see
         axes.set_ylim(bottom=0)
@@ -196,7 +194,7 @@ def _headline(solution: Solution, late: float, late_unit: str) -> str:
     kind = "objective" if problem is None else _wanted(problem.objective)
     size, unit = (late, late_unit) if about.objective_unit == "s" else (1.0, about.objective_unit)
     words = f"{name}{kind} {solution.objective / size:.6g} {unit.replace('^2', SQUARED)}"
-    if not problem or not isinstance(problem.objective, Time):
+    if about.objective_unit != "s":
         words += f", duration {solution.duration / late:.6g} {late_unit}"
     told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
     return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"

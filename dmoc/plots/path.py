@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.parts.engines import Engine, Nozzles
-from dmoc.parts.zones import KeepIn, KeepOut
-from dmoc.plots.scene import Corners, draw_scene, view_of
+from dmoc.parts.outline import Ball, Box
+from dmoc.plots.scene import Corners, draw_scene, outlines, view_of
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
 from dmoc.results.solution import Solution
 
@@ -63,7 +62,7 @@ def burning(solution: Solution) -> np.ndarray | None:
     """Where an engine that also coasts is on: a value a node, or a step if held; None for what never coasts."""
     strength = np.linalg.norm(solution.force, axis=1)
     on = strength > 0.02 * strength.max(initial=0.0)
-    switches = solution.problem is not None and isinstance(solution.problem.actuator, (Engine, Nozzles))
+    switches = solution.problem is not None and solution.problem.actuator.coasts
     return on if switches and on.any() and not on.all() else None
 
 
@@ -80,12 +79,12 @@ def _mark_burns(axes: Any, solution: Solution, curve: np.ndarray) -> None:
 def _draw_line(axes: Any, solution: Solution) -> None:
     times, path = within_steps(solution, solution.position)
     (late, unit_late), (size, unit) = readable(times, "s"), readable(path, "m")
-    for zone in solution.problem.constraints if solution.problem else ():
-        if isinstance(zone, KeepOut):
-            low, high = zone.center[0] - zone.radius, zone.center[0] + zone.radius
+    for shape in outlines(solution):
+        if isinstance(shape, Ball):
+            low, high = shape.center[0] - shape.radius, shape.center[0] + shape.radius
             axes.axhspan(low / size, high / size, color=FORBIDDEN, alpha=0.3, label="keep-out zone")
-        elif isinstance(zone, KeepIn):
-            for edge in (edge for edge in (*zone.lower, *zone.upper) if np.isfinite(edge)):
+        elif isinstance(shape, Box):
+            for edge in (edge for edge in (*shape.lower, *shape.upper) if np.isfinite(edge)):
                 axes.axhline(edge / size, color=FORBIDDEN, linestyle="--", label="keep-in zone")
     _mark_burns(axes, solution, np.array([solution.time / late, solution.position[:, 0] / size]))
     axes.plot(times / late, path[:, 0] / size, color=PATH, label="position")

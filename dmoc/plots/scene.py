@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.effects.gravity import J2, PointGravity
-from dmoc.parts.zones import ApproachCone, KeepIn, KeepOut
+from dmoc.effects.base import Attractor
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.outline import Ball, Box, Cone, Shape
 from dmoc.plots.style import ATTRACTOR, DARK, FORBIDDEN
 from dmoc.results.solution import Solution
 
 # How far beyond the path zones are shown, as a part of the extent.
 REACH = 0.5
+# A region without a shape of its own is looked at on a grid of this many places along each axis.
+REGION_POINTS = 200
 
 Corners = tuple[np.ndarray, np.ndarray]
 
@@ -25,10 +28,10 @@ def view_of(solution: Solution, drawn: np.ndarray) -> Corners:
     low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else np.zeros((2, solution.dimension))
     extent = float((high - low).max()) or 1.0
     near, far = low - REACH * extent, high + REACH * extent
-    for zone in solution.problem.constraints if solution.problem else ():
-        if isinstance(zone, KeepIn):
-            # walls far away would make the path a dot, and what lies behind near ones does not matter
-            walls = [np.array(side) for side in (zone.lower, zone.upper)]
+    for shape in outlines(solution):
+        if isinstance(shape, Box):
+            # Walls far away would make the path a dot, and what lies behind near ones does not matter.
+            walls = [shape.lower, shape.upper]
             low, high = (
                 np.where((w > near) & (w < far), w, end) for w, end in zip(walls, (low, high), strict=True)
             )
@@ -42,12 +45,11 @@ def view_of(solution: Solution, drawn: np.ndarray) -> Corners:
 def _boxes(solution: Solution) -> list[Corners]:
     """Opposite corners of attractors, spheres and cones [m]."""
     boxes = [(center - radius, center + radius) for center, radius in _attractors(solution)]
-    for zone in solution.problem.constraints if solution.problem else ():
-        if isinstance(zone, KeepOut):
-            center = np.array(zone.center)
-            boxes.append((center - zone.radius, center + zone.radius))
-        elif isinstance(zone, ApproachCone):
-            rim = _cone(solution, zone).reshape(solution.dimension, -1)
+    for shape in outlines(solution):
+        if isinstance(shape, Ball):
+            boxes.append((shape.center - shape.radius, shape.center + shape.radius))
+        elif isinstance(shape, Cone):
+            rim = _cone(solution, shape).reshape(solution.dimension, -1)
             boxes.append((rim.min(axis=1), rim.max(axis=1)))
     return boxes
 
@@ -55,11 +57,11 @@ def _boxes(solution: Solution) -> list[Corners]:
 def _attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
     """Centres of the point masses and their radii where the scene tells them [m], else 0."""
     effects = solution.problem.effects if solution.problem else ()
-    radius = max((effect.radius for effect in effects if isinstance(effect, J2)), default=0.0)
+    radius = max((effect.body_radius() for effect in effects), default=0.0)
+    # Where the scene tells a radius it is that of the body at the origin.
     return [
-        (np.zeros(solution.dimension), radius) if effect.center is None else (np.array(effect.center), 0.0)
-        for effect in effects
-        if isinstance(effect, PointGravity)
+        (source.place(solution.dimension), radius if source.center is None else 0.0)
+        for source in _sources(solution)
     ]
 
 
@@ -68,28 +70,57 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
     from matplotlib.patches import Patch
 
     proxies = []
-    for zone in solution.problem.constraints if solution.problem else ():
-        if isinstance(zone, KeepOut):
-            _draw_ball(axes, np.array(zone.center) / size, zone.radius / size, view, FORBIDDEN, "keep-out zone")
+    for shape in outlines(solution):
+        if isinstance(shape, Ball):
+            _draw_ball(axes, shape.center / size, shape.radius / size, view, FORBIDDEN, "keep-out zone")
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label="keep-out zone"))
-        elif isinstance(zone, KeepIn):
-            _draw_room(axes, np.array(zone.lower) / size, np.array(zone.upper) / size, view)
-        elif isinstance(zone, ApproachCone):
-            _draw_cone(axes, _cone(solution, zone) / size)
-    largest = max((effect.mu for effect in _pulls(solution)), default=1.0)
-    for (center, radius), effect in zip(_attractors(solution), _pulls(solution), strict=True):
+        elif isinstance(shape, Box):
+            _draw_room(axes, shape.lower / size, shape.upper / size, view)
+        elif isinstance(shape, Cone):
+            _draw_cone(axes, _cone(solution, shape) / size)
+    for zone in _without_outline(solution):
+        if _draw_region(axes, zone, view, size):
+            name = f"broken: {type(zone).__name__}"
+            proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label=name))
+    largest = max((source.mu for source in _sources(solution)), default=1.0)
+    for (center, radius), source in zip(_attractors(solution), _sources(solution), strict=True):
         if radius:
             _draw_ball(axes, center / size, radius / size, view, ATTRACTOR, "attractor")
             proxies.append(Patch(facecolor=ATTRACTOR, edgecolor=DARK, alpha=0.5, label="attractor"))
         elif (center / size > view[0]).all() and (center / size < view[1]).all():
             style = {"linestyle": "none", "marker": "o", "markerfacecolor": ATTRACTOR, "markeredgecolor": DARK}
-            across = 13 if effect.mu == largest else 9
+            across = 13 if source.mu == largest else 9
             axes.plot(*(center[:, None] / size), markersize=across, label="attractor", **style)
     return proxies
 
 
-def _pulls(solution: Solution) -> list[PointGravity]:
-    return [e for e in (solution.problem.effects if solution.problem else ()) if isinstance(e, PointGravity)]
+def outlines(solution: Solution) -> list[Shape]:
+    """Shapes of all that is forbidden, as the constraints tell them."""
+    constraints = solution.problem.constraints if solution.problem else ()
+    return [shape for constraint in constraints for shape in constraint.outline()]
+
+
+def _without_outline(solution: Solution) -> list[Constraint]:
+    """Limits on positions in the plane that tell no shape of theirs."""
+    if solution.problem is None or solution.dimension != 2:
+        return []
+    return [one for one in solution.problem.constraints if not one.limits_speed and not one.outline()]
+
+
+def _draw_region(axes: Any, zone: Constraint, view: Corners, size: float) -> bool:
+    """Fill where a limit is broken by a body at rest; whether there is such a place in view."""
+    x, y = (np.linspace(view[0][i], view[1][i], REGION_POINTS) for i in (0, 1))
+    places = np.stack([part.ravel() for part in np.meshgrid(x, y)], axis=1) * size
+    excess = zone.excess(places, np.zeros_like(places)).reshape(len(y), len(x))
+    if not (excess > 0).any():
+        return False
+    filled = axes.contourf(x, y, excess > 0, levels=[0.5, 1.5], colors=[FORBIDDEN], alpha=0.3, zorder=0)
+    filled.set_gid(type(zone).__name__)
+    return True
+
+
+def _sources(solution: Solution) -> tuple[Attractor, ...]:
+    return solution.problem.attraction.sources if solution.problem else ()
 
 
 def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colour: str, name: str) -> None:
@@ -114,15 +145,15 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
     axes.plot_surface(*surface, **style).set_gid(name)
 
 
-def _cone(solution: Solution, zone: ApproachCone) -> np.ndarray:
+def _cone(solution: Solution, cone: Cone) -> np.ndarray:
     """Points of a cone from the tip to as deep as the path goes [m], shape (axes, depths, around)."""
-    axis, apex = np.array(zone.axis), np.array(zone.apex)
+    axis, apex = cone.axis, cone.apex
     depth = float(np.nanmax((solution.position - apex) @ axis, initial=0.0))
     # directions across the axis: two in space, in the plane one and back
     across = np.linalg.svd(axis[None])[2][1:]
     around = np.linspace(0, 2 * np.pi, 3 if len(axis) == 2 else 37)
     circle = np.stack([np.cos(around), np.sin(around)])[: len(across)].T @ across
-    slope = axis + np.tan(zone.half_angle) * circle
+    slope = axis + np.tan(cone.half_angle) * circle
     return apex[:, None, None] + depth * np.linspace(0, 1, 9)[None, :, None] * slope.T[:, None, :]
 
 

@@ -158,7 +158,7 @@ class TransferProblem:
         for end in ("start", "goal"):
             position, velocity = getattr(self, end).fixed()
             for i, constraint in enumerate(self.constraints):
-                known = velocity if constraint.unit == "m/s" else position
+                known = velocity if constraint.limits_speed else position
                 if np.isnan(known).any():
                     continue
                 excess = float(constraint.excess(position[None], velocity[None])[0])
