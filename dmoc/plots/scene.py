@@ -16,7 +16,7 @@ from dmoc.results.solution import Solution
 # How far beyond the path zones are shown, as a part of the extent.
 REACH = 0.5
 # A region without a shape of its own is looked at on a grid of this many places along each axis.
-REGION_POINTS = 200
+REGION_POINTS = 600
 
 Corners = tuple[np.ndarray, np.ndarray]
 
@@ -80,7 +80,7 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
             _draw_cone(axes, _cone(solution, shape) / size)
     for zone in _without_outline(solution):
         if _draw_region(axes, zone, view, size):
-            name = f"broken: {type(zone).__name__}"
+            name = f"forbidden by {type(zone).__name__}"
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label=name))
     largest = max((source.mu for source in _sources(solution)), default=1.0)
     for (center, radius), source in zip(_attractors(solution), _sources(solution), strict=True):
@@ -109,12 +109,15 @@ def _without_outline(solution: Solution) -> list[Constraint]:
 
 def _draw_region(axes: Any, zone: Constraint, view: Corners, size: float) -> bool:
     """Fill where a limit is broken by a body at rest; whether there is such a place in view."""
-    x, y = (np.linspace(view[0][i], view[1][i], REGION_POINTS) for i in (0, 1))
+    span = (view[1] - view[0]).max()
+    # Axes of equal scale show more than the view along one of them.
+    x, y = (np.linspace(view[0][i] - span, view[1][i] + span, REGION_POINTS) for i in (0, 1))
     places = np.stack([part.ravel() for part in np.meshgrid(x, y)], axis=1) * size
     excess = zone.excess(places, np.zeros_like(places)).reshape(len(y), len(x))
     if not (excess > 0).any():
         return False
-    filled = axes.contourf(x, y, excess > 0, levels=[0.5, 1.5], colors=[FORBIDDEN], alpha=0.3, zorder=0)
+    edge = [1e-3 * span * size, np.inf]
+    filled = axes.contourf(x, y, excess, levels=edge, colors=[FORBIDDEN], alpha=0.3, zorder=0)
     filled.set_gid(type(zone).__name__)
     return True
 
