@@ -88,7 +88,7 @@ class Draft:
         tau, s, u = ca.SX.sym("tau"), ca.SX.sym("s", 2 * self.n), ca.SX.sym("u", self.n)
         problem, state, force = self.problem, s * self.scale + self.origin, u * self.units.force
         t, q, v, m = self.time(tau), state[: self.n], state[self.n :], problem.mass
-        push = Dynamics(self.n, problem.effects, problem.actuator).acceleration(t, q, v, m, force)
+        push = Dynamics.of(problem).acceleration(t, q, v, m, force)
         cost = problem.objective.sense * problem.objective.rate(problem.actuator, t, q, v, force, m)
         outputs = [self.duration * ca.vertcat(v, push) / self.scale, self.duration * cost / self.units.cost]
         return ca.Function("rates", [tau, s, u], outputs)

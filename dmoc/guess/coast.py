@@ -53,7 +53,7 @@ def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
     A body that comes nearer to an attractor than that stays where it is: nothing is ever evaluated at
     a singularity, and no step becomes endlessly small.
     """
-    n, fraction = dynamics.dimension, ca.SX.sym("fraction")
+    n, fraction = dynamics.positions, ca.SX.sym("fraction")
     state, given = ca.SX.sym("state", 2 * n), ca.SX.sym("given", 5 + len(centers))
     time, span, mass, length, speed, *least = ca.vertsplit(given)
     q, v = state[:n] * length, state[n:] * speed

@@ -55,7 +55,7 @@ def starting_guess(
     for end, place in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
-    controls = (len(mesh) - 1 if hold else len(fractions), problem.actuator.size(problem.dimension))
+    controls = (len(mesh) - 1 if hold else len(fractions), problem.controls)
     mass = np.full(len(fractions), problem.mass)
     guess = DiscretePath(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess

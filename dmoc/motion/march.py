@@ -91,8 +91,8 @@ def simulate(
     if path is None:
         path = _given_path(problem, controls, steps, order, hold, duration)
     elif path.position.shape[1:] + path.control.shape[1:] != (
-        problem.dimension,
-        problem.actuator.size(problem.dimension),
+        dynamics.positions,
+        dynamics.controls,
     ):
         raise ValueError("the solution has another dimension or other controls than the problem")
     path = replace(path, mass=node_masses(dynamics, path, problem.mass))
@@ -111,7 +111,7 @@ def _given_path(
     """Controls on a mesh, checked, as a path that stays at the start."""
     mesh = uniform_mesh(400 if steps is None else whole("steps", steps))
     nodes = len(node_fractions(mesh, scheme(order)))
-    shape = (len(mesh) - 1 if hold else nodes, problem.actuator.size(problem.dimension))
+    shape = (len(mesh) - 1 if hold else nodes, problem.controls)
     try:
         given = np.zeros(shape) if controls is None else np.asarray(controls, float)
     except Exception:  # whatever a user's object raises
@@ -141,7 +141,7 @@ def node_masses(dynamics: Dynamics, path: DiscretePath, mass: float) -> np.ndarr
     masses = np.full(at[-1, -1] + 1, float(mass))
     if not dynamics.actuator.burns:
         return masses
-    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    u = ca.SX.sym("u", dynamics.controls)
     flow = ca.Function("flow", [u], [ca.densify(dynamics.actuator.flow(u))])(path.control.T).full().ravel()
     h = path.duration * np.diff(path.mesh)
     burnt = h * (rule.integral @ (np.tile(flow, (rule.degree + 1, 1)) if path.hold else flow[at]))
@@ -163,7 +163,7 @@ def rollout(
 
     Only the mesh, masses and controls of `path` are used, and its first position as the origin.
     """
-    n, steps = dynamics.dimension, len(path.mesh) - 1
+    n, steps = dynamics.positions, len(path.mesh) - 1
     advance, inputs = _advance(dynamics, path, start_time, compensated)
     states = np.zeros((advance.numel_out(0), steps + 1))
     states[: 2 * n, 0] = np.concatenate([position - path.position[0], momentum])
@@ -185,7 +185,7 @@ def _advance(
 
     Compensated, the state is twice as long: its second half is what rounding has added so far.
     """
-    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.dimension
+    rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.positions
     inputs = _inputs(path, start_time)
     given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
     state = ca.MX.sym("state", 2 * n)
@@ -225,6 +225,6 @@ def _compensated(state: ca.MX, given: list, increments: ca.MX) -> ca.Function:
 
 def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
     """Force [N] of controls, one row each."""
-    u = ca.SX.sym("u", dynamics.actuator.size(dynamics.dimension))
+    u = ca.SX.sym("u", dynamics.controls)
     force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
-    return np.array(force(control.T)).T.reshape(len(control), dynamics.dimension)
+    return np.array(force(control.T)).T.reshape(len(control), dynamics.positions)

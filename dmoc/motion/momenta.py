@@ -23,7 +23,7 @@ def end_momenta(
     The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
     end what arrives there. `momenta` are the `legendre_momenta` if they are known.
     """
-    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     if momenta is None:
         momenta = legendre_momenta(dynamics, path, start_time)
     p = np.concatenate([-momenta[0], momenta[-1][-1:]])
@@ -47,7 +47,7 @@ def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> 
     and p_1 = P_s are linear in the changes of all positions of the step. All are infinite if one step's
     equations have no solution.
     """
-    n, s, steps = dynamics.dimension, scheme(path.order).degree, len(path.mesh) - 1
+    n, s, steps = dynamics.positions, scheme(path.order).degree, len(path.mesh) - 1
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
     function = remembered(make, "legendre slopes", dynamics, path.order, path.hold)
     slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
@@ -94,8 +94,8 @@ def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function
 
 
 def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
-    rule, n = scheme(order), dynamics.dimension
-    size = dynamics.actuator.size(n)
+    rule, n = scheme(order), dynamics.positions
+    size = dynamics.controls
     q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
     u = ca.SX.sym("u", size * (1 if hold else rule.degree + 1))
     t, h, origin = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("origin", n)

@@ -35,7 +35,7 @@ def reference(
     position, velocity : arrays
         NaN where the motion cannot be integrated.
     """
-    n, steps = dynamics.dimension, len(path.mesh) - 1
+    n, steps = dynamics.positions, len(path.mesh) - 1
     control = _control_powers(dynamics, path)
     start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
     march_one = remembered(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
@@ -91,7 +91,7 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     starts at t [s], from the fraction `begin` on.
     """
     places, rows, *weights = coefficients()
-    n, count = dynamics.dimension, dynamics.actuator.size(dynamics.dimension)
+    n, count = dynamics.positions, dynamics.controls
     state, powers = ca.SX.sym("state", 2 * n + 1), ca.SX.sym("control", size)
     t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
     origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", 2 * n + 1)

@@ -66,7 +66,7 @@ def flow_matrices(
     dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
 ) -> tuple[np.ndarray, bool]:
     """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
-    n, ends = dynamics.dimension, slice(None, None, scheme(path.order).degree)
+    n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh
     stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
@@ -95,7 +95,7 @@ def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, 
         mass=guess.mass[nodes],
         control=np.zeros((2 if guess.hold else len(nodes), guess.control.shape[1])),
     )
-    velocity = np.zeros((3, dynamics.dimension))
+    velocity = np.zeros((3, dynamics.freedom))
     flow, constant = flow_matrices(dynamics, probe, start_time, velocity)
     if not constant or longest * shortest * _rate_bound(flow).max() < HARMLESS:
         return

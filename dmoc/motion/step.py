@@ -83,10 +83,10 @@ def step_map(dynamics: Dynamics, scheme: Scheme, hold: bool = False) -> ca.Funct
 
 
 def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
-    n, s = dynamics.dimension, scheme.degree
+    n, s = dynamics.positions, scheme.degree
     q, p, origin = (ca.SX.sym(name, n) for name in ("q", "p", "origin"))
     t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)
-    u = ca.SX.sym("u", dynamics.actuator.size(n), 1 if hold else s + 1)
+    u = ca.SX.sym("u", dynamics.controls, 1 if hold else s + 1)
     given = [q, p, masses, u, t, h, origin]
     names = ["q", "p", "m", "u", "t", "h", "origin"]
     m = ca.vertsplit(masses)

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
-from dmoc.nlp.stencils import AXES, Limit, Stencil, Stencils
+from dmoc.nlp.stencils import Limit, Stencil, Stencils
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
@@ -30,6 +31,7 @@ class Placement:
         units: Units,
     ):
         self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
+        self.dynamics = Dynamics.of(problem)
         self.steps = len(mesh) - 1
         self.counts = {"node": self.steps * rule.degree + 1, "step": self.steps, "ends": 1}
         self.columns = self._columns()
@@ -37,7 +39,7 @@ class Placement:
         self._lower: list[np.ndarray] = []
         self._upper: list[np.ndarray] = []
         impulse = problem.mass / (units.force * units.time)
-        axes = tuple(Row(axis, 0, 0.0, 0.0) for axis in AXES[: problem.dimension])
+        axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
         numbers = {
             "fraction": node_fractions(mesh, rule),
@@ -54,7 +56,7 @@ class Placement:
 
     def _columns(self) -> Layout:
         problem, units, nodes = self.problem, self.units, self.counts["node"]
-        axes, speed = AXES[: problem.dimension], units.length / units.time
+        axes, speed = self.dynamics.configuration.names, units.length / units.time
         columns = Layout().add("position", "node", axes, nodes, units.length)
         labels = problem.actuator.labels(problem.dimension)
         columns = columns.add("force", "control", labels, self.steps if self.hold else nodes, units.force)

@@ -25,7 +25,6 @@ from dmoc.nlp.layout import Owner
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
-AXES = "xyz"
 ALL, FIRST, LAST = slice(None), slice(0, 1), slice(-1, None)
 
 
@@ -84,7 +83,7 @@ class _Writer:
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
         self.problem, self.rule, self.hold = problem, rule, hold
         self.dynamics = Dynamics.of(problem)
-        self.origin, self.start_time = ca.SX.sym("origin", problem.dimension), ca.SX.sym("start_time")
+        self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
         head = [self.origin, self.start_time, self.mass]
         if not problem.free_duration:
@@ -96,14 +95,16 @@ class _Writer:
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
-        draft, n = _Draft(self), self.problem.dimension
+        draft, n = _Draft(self), self.dynamics.positions
         r = draft.take("position", n)
-        u = None if self.hold else draft.take("force", self.actuator.size(n))
+        u = None if self.hold else draft.take("force", self.dynamics.controls)
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = self.start_time + fraction * duration, r + self.origin
         resting, _ = split_effects(self.problem.effects, n)
-        dldq, _, push = point_function(resting, n, kinetic=False)(t, q, ca.DM.zeros(n), m)
+        dldq, _, push = point_function(resting, self.dynamics.configuration, kinetic=False)(
+            t, q, ca.DM.zeros(n), m
+        )
         push = push if u is None else push + self.actuator.force(u) / m
         draft.add("dynamics", duration * weight * (dldq + push))
         for i, constraint in enumerate(self.constraints):
@@ -116,8 +117,8 @@ class _Writer:
 
     def step(self) -> Stencil:
         """Momenta of one step; cost and limits that look at its velocities or at a held control."""
-        rule, problem, n = self.rule, self.problem, self.problem.dimension
-        draft, size = _Draft(self), self.actuator.size(n)
+        rule, problem, n = self.rule, self.problem, self.dynamics.positions
+        draft, size = _Draft(self), self.dynamics.controls
         # the j-th nodes of all steps; the nodes number steps times s, and one
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
         r = [draft.take("position", n, at) for at in nodes]
@@ -130,7 +131,7 @@ class _Writer:
         elif costly:
             u = [draft.take("force", size, at) for at in nodes]
         push = [self.actuator.force(u[0]) / mass if self.hold else 0 for mass in m]
-        moving = point_function(split_effects(problem.effects, n)[1], n, kinetic=True)
+        moving = point_function(split_effects(problem.effects, n)[1], self.dynamics.configuration)
         t0 = self.start_time + begin * duration
 
         def point(t, r, v, m):
@@ -189,9 +190,9 @@ class _Writer:
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
-        draft, n = _Draft(self), self.problem.dimension
+        draft, n = _Draft(self), self.dynamics.positions
         first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
-        v = {end: draft.take(f"{end}.velocity", n) for end in ("start", "goal")}
+        v = {end: draft.take(f"{end}.velocity", self.dynamics.freedom) for end in ("start", "goal")}
         start_time, goal_time = self.start_time, self.start_time + draft.duration()
         states = {
             "start": (start_time, first, v["start"], draft.mass(FIRST)),
@@ -213,8 +214,8 @@ class _Writer:
 
     def _cost_in_steps(self) -> bool:
         """Whether the running cost looks at the velocity or at a held control."""
-        n = self.problem.dimension
-        v, u = ca.SX.sym("v", n), ca.SX.sym("u", self.actuator.size(n))
+        n = self.dynamics.positions
+        v, u = ca.SX.sym("v", n), ca.SX.sym("u", self.dynamics.controls)
         rate = ca.SX(self._rate(ca.SX.sym("t"), ca.SX.sym("q", n), v, u, ca.SX.sym("m")))
         return ca.depends_on(rate, v) or (self.hold and ca.depends_on(rate, u))
 

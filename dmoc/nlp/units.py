@@ -77,7 +77,7 @@ def _cost(problem: TransferProblem, guess: DiscretePath, force: float) -> float:
 def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
     """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
     t, q, v, m = state_symbols(problem.dimension)
-    u = ca.SX.sym("u", problem.actuator.size(problem.dimension))
+    u = ca.SX.sym("u", problem.controls)
     rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
     terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
     return ca.Function("rate", [t, q, v, u, m], [rate]), terminal

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.effects.base import Force
-from dmoc.motion.dynamics import Dynamics, specific_lagrangian, state_symbols
+from dmoc.motion.dynamics import Dynamics, specific_lagrangian
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.momenta import legendre_momenta
@@ -32,7 +32,7 @@ def _keeps_energy(solution: Solution) -> bool:
     dynamics = _dynamics(solution)
     if dynamics is None or dynamics.depends_on_time:
         return False
-    t, q, v, m = state_symbols(dynamics.dimension)
+    t, q, v, m = dynamics.symbols()
     potential = ca.SX(specific_lagrangian(dynamics.effects, t, q, v, m))
     return not (np.ptp(solution.path.mass) > 0 and ca.depends_on(potential, m))
 

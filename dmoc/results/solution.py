@@ -168,7 +168,7 @@ class Solution:
         of_kind("problem", problem, TransferProblem)
         facts = (
             ("dimension", self.dimension, problem.dimension, ""),
-            ("number of controls", self.path.control.shape[1], problem.actuator.size(problem.dimension), ""),
+            ("number of controls", self.path.control.shape[1], problem.controls, ""),
             ("start time", self.provenance.start_time, problem.start_time, " s"),
         )
         for name, here, there, unit in facts:

@@ -108,6 +108,11 @@ class TransferProblem:
         """Number of axes, 1 to 3."""
         return self.start.dimension
 
+    @property
+    def controls(self) -> int:
+        """Number of controls at a node."""
+        return self.actuator.size(self.dimension)
+
     @cached_property
     def attraction(self) -> Attraction:
         """What attracts in the scene."""
@@ -195,7 +200,7 @@ def _check_functions(problem: TransferProblem) -> None:
     """What parts of the user's own give has to have the right number of entries."""
     n, actuator = problem.dimension, problem.actuator
     t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
-    u = ca.SX.sym("u", actuator.size(n))
+    u = ca.SX.sym("u", problem.controls)
     functions: list[tuple[Any, str, list, int]] = [(actuator, "force", [u], n)]
     for effect in problem.effects:
         single = isinstance(effect, Conservative)

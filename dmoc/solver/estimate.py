@@ -70,7 +70,7 @@ def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
 def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """Error of every step by integrating it again with two halves of order 8, over extent and speed [-]."""
     rule, fine = scheme(path.order), scheme(8)
-    n, steps = dynamics.dimension, len(path.mesh) - 1
+    n, steps = dynamics.positions, len(path.mesh) - 1
     momentum, _ = end_momenta(dynamics, path, start_time)
     extent, speed = path_scales(path)
     states = np.concatenate([path.position[:: rule.degree], momentum], axis=1)

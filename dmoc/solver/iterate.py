@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.effects.base import Conservative, Effect
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
@@ -67,7 +68,7 @@ def _states(problem: TransferProblem, guess: DiscretePath) -> tuple[np.ndarray, 
 def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
     """Which effect has no value, and at which node."""
     for effect in problem.effects:
-        point = Dynamics(problem.dimension, (effect,)).point(*state)
+        point = Dynamics(Translation(problem.dimension), (effect,)).point(*state)
         finite = np.isfinite(np.vstack([value.full() for value in point])).all(axis=0)
         if not finite.all():
             node = int(np.argmin(finite))

@@ -122,7 +122,7 @@ def drift(
             number(f"methods[{name!r}]", choice, "-", positive=True)
     period = _period(problem) if period is None else number("period", period, "s", positive=True)
     duration = revolutions * period
-    dynamics, rows = Dynamics(problem.dimension, problem.effects), []
+    dynamics, rows = Dynamics.of(problem), []
     for name, choices in chosen.items():
         for choice in choices:
             march = _adaptive if name == ADAPTIVE else _fixed
@@ -147,7 +147,7 @@ def _fixed(
     name: str, count: float, dynamics: Dynamics, problem: TransferProblem, period: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Times [s], positions [m] and momenta per mass [m/s] on the way, and the seconds it took."""
-    n, steps = dynamics.dimension, max(whole("steps", round(count * duration / period)), 2)
+    n, steps = dynamics.positions, max(whole("steps", round(count * duration / period)), 2)
     times = problem.start_time + duration / steps * np.arange(steps + 1)
     position, velocity = problem.start.fixed()
     canonical = name.startswith("order ")
@@ -172,7 +172,7 @@ def step_function(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca
 
 def _variational(order: int, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
     """(position and momentum, t, h) -> the same one step later."""
-    n, rule = dynamics.dimension, scheme(order)
+    n, rule = dynamics.positions, scheme(order)
     state, t, h = ca.MX.sym("state", 2 * n), ca.MX.sym("t"), ca.MX.sym("h")
     mass, still = problem.mass * ca.DM.ones(rule.degree + 1), ca.DM.zeros(n, rule.degree + 1)
     dq, dp, _ = step_map(dynamics, rule)(state[:n], state[n:], mass, still, t, h, ca.DM.zeros(n))
@@ -188,7 +188,7 @@ def _explicit(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Fun
     below = np.diag([0.5, 0.5, 1.0], -1)
     tableau = np.array([0, 0.5, 0.5, 1]), below, np.array([1, 2, 2, 1]) / 6
     places, below, weights = tableau if name == "RK4" else (DOP853.C, DOP853.A, DOP853.B)
-    n, slopes = dynamics.dimension, list[ca.SX]()
+    n, slopes = dynamics.positions, list[ca.SX]()
     state, t, h = ca.SX.sym("state", 2 * n), ca.SX.sym("t"), ca.SX.sym("h")
     for place, row in zip(places, below, strict=True):
         at = state + h * weighted(row[: len(slopes)], slopes)
@@ -197,7 +197,7 @@ def _explicit(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Fun
 
 
 def _rate(dynamics: Dynamics, problem: TransferProblem, t: ca.SX, state: ca.SX) -> ca.SX:
-    n, no_force = dynamics.dimension, ca.DM.zeros(dynamics.dimension)
+    n, no_force = dynamics.positions, ca.DM.zeros(dynamics.positions)
     return ca.vertcat(state[n:], dynamics.acceleration(t, state[:n], state[n:], problem.mass, no_force))
 
 
@@ -207,7 +207,7 @@ def _adaptive(
     """The same by SciPy's DOP853, which chooses its steps."""
     from scipy.integrate import solve_ivp
 
-    n = dynamics.dimension
+    n = dynamics.positions
     at, now, rate = np.empty(1), np.empty(2 * n), np.empty(2 * n)
     t, state = ca.SX.sym("t"), ca.SX.sym("state", 2 * n)
     # a buffer spares the conversions of a call, which would take longer than all the rest

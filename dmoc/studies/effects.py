@@ -21,6 +21,7 @@ from dmoc.effects import (
     ThirdBody,
     circular_motion,
 )
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta
@@ -142,7 +143,7 @@ def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: 
     n = problem.dimension
     t, q, v, m = state_symbols(n)
     still = ca.DM.zeros(n)
-    alone = Dynamics(n, (effect,), problem.actuator).acceleration(t, q, v, m, still)
+    alone = Dynamics(Translation(n), (effect,), problem.actuator).acceleration(t, q, v, m, still)
     function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
     ends = slice(None, None, scheme(path.order).degree)
     times = problem.start_time + path.duration * path.mesh

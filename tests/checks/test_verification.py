@@ -56,7 +56,7 @@ def with_path(solution, **changes):
     """A solution with another path, reported just as if the solver had found it."""
     path = replace(solution.path, **changes)
     problem = solution.problem
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    dynamics = Dynamics.of(problem)
     momentum, velocity = end_momenta(dynamics, path, problem.start_time)
     return replace(
         solution, path=path, momentum=momentum, velocity=velocity, force=force_of(dynamics, path.control)

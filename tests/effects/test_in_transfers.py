@@ -29,6 +29,7 @@ from dmoc import (
     tabulated_motion,
 )
 from dmoc.checks.verification import verify
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics, split_effects
 
 MU, RADIUS = 3.986004418e14, 6.378137e6
@@ -104,7 +105,7 @@ def test_only_effects_of_the_velocity_look_at_it(effect):
 
 def test_no_effect_branches():
     """CasADi evaluates both sides of a branch: the one not taken may be NaN, and so is then the derivative."""
-    dynamics = Dynamics(3, (PointGravity(MU), *IN_SPACE.values()))
+    dynamics = Dynamics(Translation(3), (PointGravity(MU), *IN_SPACE.values()))
     branches = {ca.OP_IF_ELSE_ZERO, ca.OP_FLOOR, ca.OP_SIGN, ca.OP_FABS}
     point = dynamics.point
     assert not branches & {point.instruction_id(i) for i in range(point.n_instructions())}

@@ -9,6 +9,7 @@ from dmoc import PointGravity, RotatingFrame, Spring, State, ThirdBody, Transfer
 from dmoc.basics.numerics import root
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import Spiral
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import coefficients
 
@@ -36,7 +37,7 @@ def moon(t):
 @pytest.mark.parametrize("begin, finish", [(0.5, 6.0), (6.0, 0.5)])
 def test_it_is_the_motion_without_thrust(effects, begin, finish):
     problem, state = scene(effects, start_time=0.7), np.array([1.3, 0.2, 0.1, 0.7])
-    acceleration = Dynamics(2, effects).acceleration
+    acceleration = Dynamics(Translation(2), effects).acceleration
 
     def rate(t, y):
         push = acceleration(problem.start_time + t, y[:2], y[2:], problem.mass, np.zeros(2))

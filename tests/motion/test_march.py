@@ -56,7 +56,7 @@ def held_path(problem, control, order=2, hold=True, mesh=None):
 
 
 def refer(problem, path):
-    dynamics = Dynamics(problem.dimension, problem.effects, problem.actuator)
+    dynamics = Dynamics.of(problem)
     return reference(dynamics, path, problem.start_time, problem.start.fixed()[1])
 
 

@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dmoc import Effort, LinearDrag, Objective, PointGravity, RotatingFrame, State, TransferProblem, solve
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.step import step_map
@@ -73,7 +74,7 @@ def reference_state(scene, force):
 def simulated_state(scene, order, steps, force, hold):
     """Position and velocity at the end by the one-step map."""
     rule, h = scheme(order), SPAN / steps
-    dynamics = Dynamics(2, SIMULATED[scene])
+    dynamics = Dynamics(Translation(2), SIMULATED[scene])
     step = step_map(dynamics, rule, hold)
     begins = h * np.arange(steps)
     columns = 1 if hold else rule.degree + 1

@@ -16,6 +16,7 @@ from dmoc import (
     UniformGravity,
     three_body,
 )
+from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.step import step_map
@@ -47,7 +48,7 @@ CONSERVATIVE = {
 
 
 def one_step(effects, dimension, order, hold=False):
-    return step_map(Dynamics(dimension, tuple(effects)), scheme(order), hold)
+    return step_map(Dynamics(Translation(dimension), tuple(effects)), scheme(order), hold)
 
 
 def tangent(step, dimension, order, h=0.15):
