@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -59,7 +59,7 @@ class NLP:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""
         old = self.problem
 
-        def each(alike: Callable, new: tuple, known: tuple) -> bool:
+        def each(alike: Callable, new: Sequence, known: Sequence) -> bool:
             return len(new) == len(known) and all(map(alike, new, known))
 
         same = {

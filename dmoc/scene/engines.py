@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, limits, number, short, vector
+from dmoc.basics.arguments import Vector, entries, limits, number, short, vector
 from dmoc.scene.actuator import Actuator
 from dmoc.scene.rows import Row
 
@@ -87,7 +88,7 @@ class Engine(_Burner):
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
     min_thrust: float = 0.0
-    box: float | tuple | None = None
+    box: float | Vector | None = None
     smoothing: float = 1e-5
 
     def __post_init__(self) -> None:
@@ -157,8 +158,8 @@ class Nozzles(_Burner):
         As for `Engine`.
     """
 
-    directions: tuple
-    max_thrust: float | tuple
+    directions: Sequence[Vector] | np.ndarray
+    max_thrust: float | Vector
     specific_impulse: float | None = None
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0

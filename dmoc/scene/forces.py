@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import limits
+from dmoc.basics.arguments import Vector, limits
 from dmoc.scene.actuator import Actuator
 from dmoc.scene.engines import Engine
 from dmoc.scene.rows import Row
@@ -29,7 +29,7 @@ class BoxForce(Actuator):
         Largest force [N], one number or one for each axis.
     """
 
-    limit: float | tuple
+    limit: float | Vector
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "limit", limits("limit", self.limit, "N"))

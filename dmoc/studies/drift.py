@@ -122,7 +122,7 @@ def drift(
             number(f"methods[{name!r}]", choice, "-", positive=True)
     period = _period(problem) if period is None else number("period", period, "s", positive=True)
     duration = revolutions * period
-    dynamics, rows = Dynamics(problem.dimension, problem.effects), []
+    dynamics, rows = Dynamics(problem.dimension, tuple(problem.effects)), []
     for name, choices in chosen.items():
         for choice in choices:
             march = _adaptive if name == ADAPTIVE else _fixed

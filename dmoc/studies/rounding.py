@@ -131,7 +131,7 @@ def growth() -> list[Growth]:
     """Growth of one step of several methods on x'' = -omega^2 x, for many values of h omega."""
     here = State((1,), (0,))
     case = TransferProblem(1.0, here, here, 1.0, effects=(Spring(1.0, (0.0,)),))
-    dynamics, rows = Dynamics(1, case.effects), []
+    dynamics, rows = Dynamics(1, tuple(case.effects)), []
     for name in METHODS:
         step = step_function(name, dynamics, case).map(len(REACH))
         columns = [
