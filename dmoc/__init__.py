@@ -5,78 +5,102 @@ State a transfer with `TransferProblem`, `solve` it, `verify` it. Everything pub
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
-from typing import Any
+from pkgutil import get_data
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-# Imported on first use, so that `dmoc --help` answers before CasADi is loaded.
-_HOMES = {
-    "dmoc.parts.actuator": ("Actuator",),
-    "dmoc.parts.forces": ("BallForce", "BoxForce", "FreeForce"),
-    "dmoc.scene.ends": ("Boundary", "Condition", "Moving", "State"),
-    "dmoc.parts.constraint": ("Constraint",),
-    "dmoc.parts.zones": ("ApproachCone", "KeepIn", "KeepOut"),
-    "dmoc.parts.speed": ("SpeedLimit",),
-    "dmoc.effects": (
-        "J2",
-        "Atmosphere",
-        "ClohessyWiltshire",
-        "ConicalShadow",
-        "Conservative",
-        "CylindricalShadow",
-        "Drag",
-        "Effect",
-        "ExponentialAtmosphere",
-        "Force",
-        "LinearDrag",
-        "PointGravity",
-        "RadiationPressure",
-        "RotatingFrame",
-        "Shadow",
-        "Spring",
-        "ThirdBody",
-        "UniformAtmosphere",
-        "UniformGravity",
-        "Wind",
-        "circular_motion",
-        "kepler_motion",
-        "tabulated_motion",
-        "three_body",
-    ),
-    "dmoc.parts.engines": ("Engine", "Nozzles"),
-    "dmoc.exports.export": ("export",),
-    "dmoc.studies.drift": ("drift",),
-    "dmoc.parts.objectives": (
-        "Effort",
-        "FinalHeight",
-        "FinalMass",
-        "FinalRadius",
-        "Fuel",
-        "Objective",
-        "Time",
-        "WeightedSum",
-    ),
-    "dmoc.scene.orbits": ("CircularOrbit", "Orbit"),
-    "dmoc.scene.problem": ("TransferProblem",),
-    "dmoc.parts.rows": ("Row",),
-    "dmoc.motion.march": ("Trajectory", "simulate"),
-    "dmoc.results.solution": ("Solution", "SolveError", "load"),
-    "dmoc.solver.solve": ("solve",),
-    "dmoc.studies.accuracy": ("Formulation", "work_precision"),
-    "dmoc.sweeps.sweep": ("sweep",),
-    "dmoc.nlp.program": ("NLP",),
-    "dmoc.nlp.transcription": ("transcribe",),
-    "dmoc.checks.verification": ("Report", "verify"),
-}
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+# The one list of public names, for type checkers and editors as for Python. Python itself imports a name
+# on its first use only, so that `dmoc --help` answers before CasADi is loaded.
+if TYPE_CHECKING:
+    from dmoc.checks.verification import Report as Report
+    from dmoc.checks.verification import verify as verify
+    from dmoc.effects import J2 as J2
+    from dmoc.effects import Atmosphere as Atmosphere
+    from dmoc.effects import ClohessyWiltshire as ClohessyWiltshire
+    from dmoc.effects import ConicalShadow as ConicalShadow
+    from dmoc.effects import Conservative as Conservative
+    from dmoc.effects import CylindricalShadow as CylindricalShadow
+    from dmoc.effects import Drag as Drag
+    from dmoc.effects import Effect as Effect
+    from dmoc.effects import ExponentialAtmosphere as ExponentialAtmosphere
+    from dmoc.effects import Force as Force
+    from dmoc.effects import LinearDrag as LinearDrag
+    from dmoc.effects import PointGravity as PointGravity
+    from dmoc.effects import RadiationPressure as RadiationPressure
+    from dmoc.effects import RotatingFrame as RotatingFrame
+    from dmoc.effects import Shadow as Shadow
+    from dmoc.effects import Spring as Spring
+    from dmoc.effects import ThirdBody as ThirdBody
+    from dmoc.effects import UniformAtmosphere as UniformAtmosphere
+    from dmoc.effects import UniformGravity as UniformGravity
+    from dmoc.effects import Wind as Wind
+    from dmoc.effects import circular_motion as circular_motion
+    from dmoc.effects import kepler_motion as kepler_motion
+    from dmoc.effects import tabulated_motion as tabulated_motion
+    from dmoc.effects import three_body as three_body
+    from dmoc.exports.export import export as export
+    from dmoc.motion.march import Trajectory as Trajectory
+    from dmoc.motion.march import simulate as simulate
+    from dmoc.nlp.program import NLP as NLP
+    from dmoc.nlp.transcription import transcribe as transcribe
+    from dmoc.parts.actuator import Actuator as Actuator
+    from dmoc.parts.constraint import Constraint as Constraint
+    from dmoc.parts.engines import Engine as Engine
+    from dmoc.parts.engines import Nozzles as Nozzles
+    from dmoc.parts.forces import BallForce as BallForce
+    from dmoc.parts.forces import BoxForce as BoxForce
+    from dmoc.parts.forces import FreeForce as FreeForce
+    from dmoc.parts.objectives import Effort as Effort
+    from dmoc.parts.objectives import FinalHeight as FinalHeight
+    from dmoc.parts.objectives import FinalMass as FinalMass
+    from dmoc.parts.objectives import FinalRadius as FinalRadius
+    from dmoc.parts.objectives import Fuel as Fuel
+    from dmoc.parts.objectives import Objective as Objective
+    from dmoc.parts.objectives import Time as Time
+    from dmoc.parts.objectives import WeightedSum as WeightedSum
+    from dmoc.parts.rows import Row as Row
+    from dmoc.parts.speed import SpeedLimit as SpeedLimit
+    from dmoc.parts.zones import ApproachCone as ApproachCone
+    from dmoc.parts.zones import KeepIn as KeepIn
+    from dmoc.parts.zones import KeepOut as KeepOut
+    from dmoc.results.solution import Solution as Solution
+    from dmoc.results.solution import SolveError as SolveError
+    from dmoc.results.solution import load as load
+    from dmoc.scene.ends import Boundary as Boundary
+    from dmoc.scene.ends import Condition as Condition
+    from dmoc.scene.ends import Moving as Moving
+    from dmoc.scene.ends import State as State
+    from dmoc.scene.orbits import CircularOrbit as CircularOrbit
+    from dmoc.scene.orbits import Orbit as Orbit
+    from dmoc.scene.problem import TransferProblem as TransferProblem
+    from dmoc.solver.solve import solve as solve
+    from dmoc.studies.accuracy import Formulation as Formulation
+    from dmoc.studies.accuracy import work_precision as work_precision
+    from dmoc.studies.drift import drift as drift
+    from dmoc.sweeps.sweep import sweep as sweep
+
+
+def _homes() -> dict[str, str]:
+    """The module of each public name, as the imports above say; this file may stand in a zip file."""
+    nodes = ast.walk(ast.parse(get_data(__name__, "__init__.py") or ""))
+    listed = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+    homes = {alias.name: node.module or "" for node in listed for alias in node.names}
+    return {name: home for name, home in homes.items() if home.startswith("dmoc.")}
+
+
+_HOME_OF = _homes()
 __all__ = sorted(_HOME_OF)
 
+# a type checker that saw this would take a misspelt name for one found here
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'dmoc' has no attribute {name!r}")
-    return getattr(import_module(_HOME_OF[name]), name)
+    def __getattr__(name: str) -> Any:
+        if name not in _HOME_OF:
+            raise AttributeError(f"module 'dmoc' has no attribute {name!r}")
+        return getattr(import_module(_HOME_OF[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -16,6 +16,7 @@ from dmoc import (
     J2,
     CircularOrbit,
     Drag,
+    Effect,
     Engine,
     ExponentialAtmosphere,
     Fuel,
@@ -65,7 +66,7 @@ def problem(
     radius = RADIUS + height
     along, up = math.cos(inclination), math.sin(inclination)
     speed = math.sqrt(MU / radius)
-    effects = [PointGravity(MU)]
+    effects: list[Effect] = [PointGravity(MU)]
     effects += [J2(MU, RADIUS, OBLATENESS)] if oblate else []
     effects += [Drag(5.0, 2.2, AIR)] if air else []
     return TransferProblem(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,10 @@ import numpy as np
 LARGEST, SMALLEST = 1e50, 1e-50
 # More steps would not fit into memory.
 MOST = 10_000_000
+
+# What a part takes for a vector; it holds the tuple that `vector` makes of it. None stands for what is free.
+Vector = Sequence[float] | np.ndarray
+FreeVector = Sequence[float | None] | np.ndarray | None
 
 
 def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative: bool = False) -> float:
@@ -103,3 +108,8 @@ def short(value: Any) -> str:
     """`value` as it is written, on one line that is not too long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def times_each(value: float | Vector, factor: float) -> float | tuple[float, ...]:
+    """A number, or each of several, so many times as large."""
+    return factor * value if isinstance(value, (int, float)) else tuple(factor * float(each) for each in value)

@@ -124,8 +124,9 @@ def solve(
         if starts > 1:
             start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
         with watched(as_json or quiet, unit) as progress:
-            numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold, "compiled": compiled}
-            solution = dmoc.solve(case, guess=start, progress=progress, **numerics)
+            solution = dmoc.solve(
+                case, order, steps, tol, hold, guess=start, progress=progress, compiled=compiled
+            )
         from dmoc.checks.verification import verify
 
         verdict = verify(solution) if solution.success else None

@@ -200,7 +200,7 @@ class Drag(Force):
     def check_dimension(self, dimension: int) -> None:
         self.atmosphere.check_dimension(dimension)
 
-    def force(self, t, q, v, m):
+    def force(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         against = v - self.atmosphere.velocity_at(t, q)
         speed = ca.sqrt(ca.dot(against, against) + SPEED_FLOOR**2)
         density = self.atmosphere.density_at(t, q)
@@ -232,7 +232,7 @@ class LinearDrag(Force):
         if self.wind is not None:
             self.wind.check_dimension(dimension)
 
-    def force(self, t, q, v, m):
+    def force(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return -self.coefficient * (v if self.wind is None else v - self.wind.velocity(t, q))
 
 

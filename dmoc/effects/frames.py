@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number, vector
+from dmoc.basics.arguments import Vector, number, vector
 from dmoc.effects.base import Conservative, Effect
 from dmoc.effects.gravity import PointGravity
 
@@ -24,7 +25,7 @@ class RotatingFrame(Conservative):
         Angular velocity w [rad/s]; a number turns about the z axis.
     """
 
-    rate: float | tuple
+    rate: float | Vector
 
     def __post_init__(self) -> None:
         try:
@@ -43,8 +44,8 @@ class RotatingFrame(Conservative):
                 "a number needs 2 or 3 dimensions, a vector 3"
             )
 
-    def lagrangian(self, t, q, v, m):
-        if isinstance(self.rate, tuple):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        if not isinstance(self.rate, float):
             drift = ca.cross(ca.DM(self.rate), q)
         else:
             drift = ca.vertcat(-self.rate * q[1], self.rate * q[0], *([0] if q.numel() == 3 else []))
@@ -80,7 +81,7 @@ class ClohessyWiltshire(Conservative):
         if dimension == 1:
             raise ValueError("ClohessyWiltshire needs 2 (x radial, y along track) or 3 dimensions; got 1")
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         n = self.mean_motion
         planar = 2 * n * q[0] * v[1] + 1.5 * (n * q[0]) ** 2
         return planar if q.numel() == 2 else planar - 0.5 * (n * q[2]) ** 2

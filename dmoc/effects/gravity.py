@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number, vector
+from dmoc.basics.arguments import Vector, number, vector
 from dmoc.effects.base import Attractor, Conservative, need_dimension
 
 
@@ -20,7 +21,7 @@ class UniformGravity(Conservative):
         g [m/s^2], one entry an axis, for example (0, 0, -9.81).
     """
 
-    acceleration: tuple
+    acceleration: Vector
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "acceleration", vector("acceleration", self.acceleration, "m/s^2"))
@@ -28,7 +29,7 @@ class UniformGravity(Conservative):
     def check_dimension(self, dimension: int) -> None:
         need_dimension(self, "acceleration", len(self.acceleration), dimension)
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return ca.dot(ca.DM(self.acceleration), q)
 
 
@@ -45,7 +46,7 @@ class PointGravity(Conservative):
     """
 
     mu: float
-    center: tuple | None = None
+    center: Vector | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
@@ -56,13 +57,13 @@ class PointGravity(Conservative):
         if self.center is not None:
             need_dimension(self, "center", len(self.center), dimension)
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         offset = q if self.center is None else q - ca.DM(self.center)
         # sqrt and multiplication: a power of 3/2 in the derivative would dominate the step function
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 
     def attractor(self) -> Attractor:
-        return Attractor(self.mu, self.center)
+        return Attractor(self.mu, None if self.center is None else tuple(self.center))
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class J2(Conservative):
         if dimension == 1:
             raise ValueError("J2 needs 2 (in the equator) or 3 dimensions; got 1")
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         squared = ca.dot(q, q)
         pull = 0.5 * self.mu * self.j2 * self.radius**2 / (squared * ca.sqrt(squared))
         return pull if q.numel() == 2 else pull * (1 - 3 * q[2] * q[2] / squared)
@@ -126,7 +127,7 @@ class Spring(Conservative):
     """
 
     stiffness: float
-    anchor: tuple
+    anchor: Vector
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stiffness", number("stiffness", self.stiffness, "N/m", nonnegative=True))
@@ -135,6 +136,6 @@ class Spring(Conservative):
     def check_dimension(self, dimension: int) -> None:
         need_dimension(self, "anchor", len(self.anchor), dimension)
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         offset = q - ca.DM(self.anchor)
         return -0.5 * self.stiffness / m * ca.dot(offset, offset)

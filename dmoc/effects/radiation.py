@@ -166,7 +166,7 @@ class RadiationPressure(Force):
         if dimension == 1 and self.shadow is not None:
             raise ValueError("RadiationPressure: a shadow needs 2 or 3 dimensions; got 1")
 
-    def force(self, t, q, v, m):
+    def force(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         sun = position_at(self.sun, t, q.numel())
         offset = sun - q
         squared = ca.dot(offset, offset)

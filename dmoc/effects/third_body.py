@@ -55,7 +55,7 @@ class ThirdBody(Conservative):
         column = position_at(self.position, ca.SX.sym("t"), dimension)
         need_dimension(self, "position", column.numel(), dimension)
 
-    def lagrangian(self, t, q, v, m):
+    def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         s = position_at(self.position, t, q.numel())
         offset, distance = s - q, ca.dot(s, s)
         x = ca.dot(q, q - 2 * s) / distance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -55,7 +55,7 @@ class NLP:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""
         old = self.problem
 
-        def each(alike: Callable, new: tuple, known: tuple) -> bool:
+        def each(alike: Callable, new: Sequence, known: Sequence) -> bool:
             return len(new) == len(known) and all(map(alike, new, known))
 
         same = {

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, limits, number, short, vector
+from dmoc.basics.arguments import Vector, entries, limits, number, short, times_each, vector
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
 
@@ -92,7 +93,7 @@ class Engine(_Burner):
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
     min_thrust: float = 0.0
-    box: float | tuple | None = None
+    box: float | Vector | None = None
     smoothing: float = 1e-5
 
     def __post_init__(self) -> None:
@@ -137,8 +138,7 @@ class Engine(_Burner):
         return self.max_thrust
 
     def times(self, factor: float) -> Engine:
-        box = self.box if self.box is None else tuple(factor * np.atleast_1d(self.box))
-        box = box[0] if box is not None and not isinstance(self.box, tuple) else box
+        box = None if self.box is None else times_each(self.box, factor)
         return replace(self, max_thrust=factor * self.max_thrust, box=box)
 
     def excess(self, u: np.ndarray) -> np.ndarray:
@@ -167,8 +167,8 @@ class Nozzles(_Burner):
         As for `Engine`.
     """
 
-    directions: tuple
-    max_thrust: float | tuple
+    directions: Sequence[Vector] | np.ndarray
+    max_thrust: float | Vector
     specific_impulse: float | None = None
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
@@ -227,7 +227,7 @@ class Nozzles(_Burner):
         return float(np.max(self.max_thrust))
 
     def times(self, factor: float) -> Nozzles:
-        return replace(self, max_thrust=tuple(factor * thrust for thrust in self.max_thrust))  # type: ignore[union-attr]
+        return replace(self, max_thrust=times_each(self.max_thrust, factor))
 
     def words(self) -> str:
         return (

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import limits
+from dmoc.basics.arguments import Vector, limits, times_each
 from dmoc.basics.digits import up
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.engines import Engine
@@ -30,7 +30,7 @@ class BoxForce(Actuator):
         Largest force [N], one number or one for each axis.
     """
 
-    limit: float | tuple
+    limit: float | Vector
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "limit", limits("limit", self.limit, "N"))
@@ -54,7 +54,7 @@ class BoxForce(Actuator):
         return float(np.max(self.limit))
 
     def times(self, factor: float) -> BoxForce:
-        return BoxForce(_each(self.limit, factor))
+        return BoxForce(times_each(self.limit, factor))
 
     def needs(self, eased: Actuator) -> str:
         if not isinstance(self.limit, tuple):
@@ -125,7 +125,3 @@ class BallForce(Actuator):
 
     def words(self) -> str:
         return f"a force in any direction of at most {self.limit:g} N"
-
-
-def _each(limit: float | tuple, factor: float) -> float | tuple:
-    return tuple(factor * one for one in limit) if isinstance(limit, tuple) else factor * limit

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from abc import ABC
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 
-from dmoc.basics.arguments import entries, number, short, vector, whole
+from dmoc.basics.arguments import Vector, entries, number, short, vector, whole
 from dmoc.parts.actuator import Actuator
 
 
@@ -140,7 +141,7 @@ class FinalRadius(Objective):
         [m]; the origin if not given.
     """
 
-    center: tuple | None = None
+    center: Vector | None = None
     unit: ClassVar[str] = "m"
     sense: ClassVar[int] = -1
 
@@ -195,7 +196,7 @@ class WeightedSum(Objective):
         of what is minimised.
     """
 
-    parts: tuple[tuple[float, Objective], ...]
+    parts: Sequence[tuple[float, Objective]]
 
     def __post_init__(self) -> None:
         pairs = [entries(part) or () for part in entries(self.parts) or ()]
@@ -212,7 +213,7 @@ class WeightedSum(Objective):
 
     @property
     def terms(self) -> tuple[tuple[float, Objective], ...]:
-        return self.parts
+        return tuple(self.parts)
 
     @property
     def sense(self) -> int:  # type: ignore[override]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, number, same_length, short, vector
+from dmoc.basics.arguments import Vector, entries, number, same_length, short, vector
 from dmoc.basics.digits import down
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import off_centre, ways_round
@@ -29,7 +29,7 @@ class KeepOut(Constraint):
         Radius [m].
     """
 
-    center: tuple
+    center: Vector
     radius: float
     adjustable: ClassVar[tuple[str, ...]] = ("center", "radius")
 
@@ -83,8 +83,8 @@ class KeepIn(Constraint):
         Opposite corners [m]; entries may be -inf and inf.
     """
 
-    lower: tuple
-    upper: tuple
+    lower: Vector
+    upper: Vector
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
@@ -139,8 +139,8 @@ class ApproachCone(Constraint):
         [m].
     """
 
-    apex: tuple
-    axis: tuple
+    apex: Vector
+    axis: Vector
     half_angle: float
     rounding: float = 1e-6
     adjustable: ClassVar[tuple[str, ...]] = ("apex", "axis", "half_angle", "rounding")
@@ -198,9 +198,9 @@ def _need(part: Any, argument: str, given: int, dimension: int) -> None:
         )
 
 
-def _point(values: tuple) -> str:
+def _point(values: Vector) -> str:
     return f"{_numbers(values)} m"
 
 
-def _numbers(values: tuple) -> str:
+def _numbers(values: Vector) -> str:
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"

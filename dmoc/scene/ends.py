@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, number, same_length, short, vector
+from dmoc.basics.arguments import FreeVector, Vector, entries, number, same_length, short, vector
 from dmoc.effects.motion import as_column, tried
 from dmoc.parts.rows import Row
 
@@ -75,8 +75,8 @@ class State(Boundary):
         [m/s], the same.
     """
 
-    position: tuple
-    velocity: tuple
+    position: FreeVector
+    velocity: FreeVector
 
     def __post_init__(self) -> None:
         position, velocity = self.position, self.velocity
@@ -92,7 +92,7 @@ class State(Boundary):
 
     @property
     def dimension(self) -> int:
-        return len(self.position)
+        return len(self.fixed()[0])
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.position, float), np.array(self.velocity, float)
@@ -198,7 +198,7 @@ class Condition(Boundary):
 
     function: Callable
     name: str = "condition"
-    scale: float | tuple = 1.0
+    scale: float | Vector = 1.0
     state: State | None = None
 
     def __post_init__(self) -> None:

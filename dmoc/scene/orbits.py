@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import flag, number, vector
+from dmoc.basics.arguments import Vector, flag, number, vector
 from dmoc.parts.rows import Row
 from dmoc.scene.elements import ELEMENTS, element_rows, nearest_state, plane_elements
 from dmoc.scene.ends import Boundary
@@ -19,7 +19,7 @@ class _Around(Boundary):
     """Shared by orbits: an attractor's `mu` and `center`, which without more leaves the axes open."""
 
     mu: float
-    center: tuple | None
+    center: Vector | None
 
     @property
     def dimension(self) -> int:
@@ -84,8 +84,8 @@ class CircularOrbit(_Around):
 
     radius: float
     mu: float
-    center: tuple | None = None
-    normal: tuple | None = None
+    center: Vector | None = None
+    normal: Vector | None = None
     clockwise: bool = False
 
     def __post_init__(self) -> None:
@@ -181,7 +181,7 @@ class Orbit(_Around):
     raan: float | None = None
     argp: float | None = None
     nu: float | None = None
-    center: tuple | None = None
+    center: Vector | None = None
 
     def __post_init__(self) -> None:
         for name in ELEMENTS:
@@ -245,5 +245,5 @@ class Orbit(_Around):
         return f"an orbit with {', '.join(elements)}{where}"
 
 
-def _point(values: tuple) -> str:
+def _point(values: Vector) -> str:
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -60,10 +60,10 @@ class TransferProblem:
     start: Boundary
     goal: Boundary
     duration: float | tuple[float, float]
-    effects: tuple[Effect, ...] = ()
+    effects: Sequence[Effect] = ()
     actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
     objective: Objective = Effort()  # noqa: RUF009 - immutable
-    constraints: tuple[Constraint, ...] = ()
+    constraints: Sequence[Constraint] = ()
     guess: Any = None
     start_time: float = 0.0
     name: str = field(default="problem", compare=False)
