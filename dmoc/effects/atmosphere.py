@@ -8,8 +8,8 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number, short, vector
-from dmoc.effects.base import Force, Part, need_dimension
+from dmoc.basics.arguments import checked, matching_length, number, short, vector
+from dmoc.effects.base import Force, Part
 from dmoc.effects.motion import as_column, tried
 
 # |w| is rounded to sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], so that drag has derivatives of every order at rest.
@@ -31,7 +31,7 @@ class Wind(Part):
 
     def __post_init__(self) -> None:
         if not callable(self.field):
-            object.__setattr__(self, "field", vector("wind", self.field, "m/s"))
+            checked(self, field=vector("wind", self.field, "m/s"))
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError unless the field gives one velocity an axis."""
@@ -41,7 +41,7 @@ class Wind(Part):
         )
         symbols = [ca.SX.sym("t"), ca.SX.sym("q", dimension)]
         entries = tried(f"wind in {dimension} dimensions", self.velocity, symbols, remedy)
-        need_dimension(self, "the velocity", entries, dimension)
+        matching_length(self, "the velocity", entries, dimension)
 
     def velocity(self, t: Any, q: Any) -> Any:
         """Velocity of the air [m/s]."""
@@ -79,8 +79,11 @@ class UniformAtmosphere(Atmosphere):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "density", number("density", self.density, "kg/m^3", nonnegative=True))
-        object.__setattr__(self, "wind", _wind(self.wind))
+        checked(
+            self,
+            density=number("density", self.density, "kg/m^3", nonnegative=True),
+            wind=_wind(self.wind),
+        )
 
     def check_dimension(self, dimension: int) -> None:
         if self.wind is not None:
@@ -130,12 +133,15 @@ class ExponentialAtmosphere(Atmosphere):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "density", number("density", self.density, "kg/m^3", nonnegative=True))
-        object.__setattr__(self, "height", number("height", self.height, "m"))
-        for name in ("scale_height", "radius"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "m", positive=True))
-        object.__setattr__(self, "rate", number("rate", self.rate, "rad/s"))
-        object.__setattr__(self, "wind", _wind(self.wind))
+        checked(
+            self,
+            density=number("density", self.density, "kg/m^3", nonnegative=True),
+            height=number("height", self.height, "m"),
+            scale_height=number("scale_height", self.scale_height, "m", positive=True),
+            radius=number("radius", self.radius, "m", positive=True),
+            rate=number("rate", self.rate, "rad/s"),
+            wind=_wind(self.wind),
+        )
         if self.height >= self.radius:
             raise ValueError(
                 f"ExponentialAtmosphere: height is above the surface and must be less than the radius; "
@@ -187,9 +193,10 @@ class Drag(Force):
     atmosphere: Atmosphere
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "area", number("area", self.area, "m^2", nonnegative=True))
-        object.__setattr__(
-            self, "drag_coefficient", number("drag_coefficient", self.drag_coefficient, "-", nonnegative=True)
+        checked(
+            self,
+            area=number("area", self.area, "m^2", nonnegative=True),
+            drag_coefficient=number("drag_coefficient", self.drag_coefficient, "-", nonnegative=True),
         )
         if not isinstance(self.atmosphere, Atmosphere):
             raise ValueError(
@@ -223,10 +230,11 @@ class LinearDrag(Force):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "coefficient", number("coefficient", self.coefficient, "N s/m", nonnegative=True)
+        checked(
+            self,
+            coefficient=number("coefficient", self.coefficient, "N s/m", nonnegative=True),
+            wind=_wind(self.wind),
         )
-        object.__setattr__(self, "wind", _wind(self.wind))
 
     def check_dimension(self, dimension: int) -> None:
         if self.wind is not None:

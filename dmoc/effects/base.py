@@ -58,16 +58,6 @@ class Force(Effect):
         """Force on the body [N]."""
 
 
-def need_dimension(effect: Any, argument: str, needed: int, dimension: int) -> None:
-    """ValueError unless the argument's length fits the problem's dimension."""
-    if needed != dimension:
-        name = type(effect).__name__
-        raise ValueError(
-            f"{name}: {argument} has {needed} entries but the problem has {dimension} dimensions; "
-            f"give {dimension} entries"
-        )
-
-
 def _in_words(value: Any, unit: str) -> str:
     if isinstance(value, Part):
         return f"{type(value).__name__}({', '.join(value._numbers())})"

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import number, vector
+from dmoc.basics.arguments import checked, number, vector
 from dmoc.effects.base import Part
 
 
@@ -135,10 +135,13 @@ class CircularMotion(Part):
     inclination: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
-        object.__setattr__(self, "rate", number("rate", self.rate, "rad/s"))
-        for name in ("phase", "inclination"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "rad"))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            rate=number("rate", self.rate, "rad/s"),
+            phase=number("phase", self.phase, "rad"),
+            inclination=number("inclination", self.inclination, "rad"),
+        )
 
     def __call__(self, t: Any) -> Any:
         u = self.phase + self.rate * t
@@ -173,15 +176,18 @@ class KeplerMotion(Part):
     mean_anomaly: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
-        object.__setattr__(self, "a", number("a", self.a, "m", positive=True))
-        object.__setattr__(self, "e", number("e", self.e, "-", nonnegative=True))
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            a=number("a", self.a, "m", positive=True),
+            e=number("e", self.e, "-", nonnegative=True),
+        )
         if self.e > 0.99:
             raise ValueError(
                 f"e must not exceed 0.99 [-]; got {self.e:g}: give such a motion as a table (tabulated_motion)"
             )
-        for name in ("i", "node", "argument", "mean_anomaly"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "rad"))
+        angles = ("i", "node", "argument", "mean_anomaly")
+        checked(self, **{name: number(name, getattr(self, name), "rad") for name in angles})
 
     def __call__(self, t: Any) -> Any:
         e, mean = self.e, self.mean_anomaly + math.sqrt(self.mu / self.a) / self.a * t
@@ -233,8 +239,11 @@ class TabulatedMotion(Part):
                 f"positions must be finite, of shape ({len(times)}, dimension), one row a time [m]; "
                 f"got shape {positions.shape}"
             )
-        object.__setattr__(self, "times", tuple(times.tolist()))
-        object.__setattr__(self, "positions", tuple(map(tuple, positions.tolist())))
+        checked(
+            self,
+            times=tuple(times.tolist()),
+            positions=tuple(map(tuple, positions.tolist())),
+        )
 
     @cached_property
     def _spline(self) -> tuple[ca.Function, ca.Function]:

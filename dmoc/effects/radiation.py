@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import number, short
-from dmoc.effects.base import Force, Part, need_dimension
+from dmoc.basics.arguments import checked, matching_length, number, short
+from dmoc.effects.base import Force, Part
 from dmoc.effects.motion import given_motion, position_at
 
 SOLAR_PRESSURE = 4.56e-6  # [N/m^2] at one astronomical unit
@@ -47,8 +47,11 @@ class CylindricalShadow(Shadow):
     sharpness: float = 100.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
-        object.__setattr__(self, "sharpness", number("sharpness", self.sharpness, "-", positive=True))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            sharpness=number("sharpness", self.sharpness, "-", positive=True),
+        )
 
     def light(self, q: Any, sun: Any) -> Any:
         behind, across = _behind(q, sun / ca.sqrt(ca.dot(sun, sun)))
@@ -84,8 +87,11 @@ class ConicalShadow(Shadow):
     sun_radius: float = 6.957e8
 
     def __post_init__(self) -> None:
-        for name in ("radius", "sun_radius"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "m", positive=True))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            sun_radius=number("sun_radius", self.sun_radius, "m", positive=True),
+        )
 
     def light(self, q: Any, sun: Any) -> Any:
         offset = sun - q
@@ -133,14 +139,17 @@ class RadiationPressure(Force):
     shadow: Shadow | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "area", number("area", self.area, "m^2", nonnegative=True))
-        object.__setattr__(self, "reflectivity", number("reflectivity", self.reflectivity, "-"))
+        checked(
+            self,
+            area=number("area", self.area, "m^2", nonnegative=True),
+            reflectivity=number("reflectivity", self.reflectivity, "-"),
+        )
         if not 0 <= self.reflectivity <= 1:
             raise ValueError(
                 f"reflectivity must lie between 0 (black) and 1 (mirror) [-]; got {self.reflectivity:g}: "
                 "for a radiation pressure coefficient C_R give C_R - 1"
             )
-        object.__setattr__(self, "sun", given_motion("RadiationPressure", "sun", self.sun))
+        checked(self, sun=given_motion("RadiationPressure", "sun", self.sun))
         if self.shadow is not None and not isinstance(self.shadow, Shadow):
             raise ValueError(
                 "shadow must be a dmoc.Shadow such as CylindricalShadow(radius) or None; "
@@ -162,7 +171,7 @@ class RadiationPressure(Force):
 
     def check_dimension(self, dimension: int) -> None:
         column = position_at(self.sun, ca.SX.sym("t"), dimension)
-        need_dimension(self, "sun", column.numel(), dimension)
+        matching_length(self, "sun", column.numel(), dimension)
         if dimension == 1 and self.shadow is not None:
             raise ValueError("RadiationPressure: a shadow needs 2 or 3 dimensions; got 1")
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number
-from dmoc.effects.base import Conservative, need_dimension
+from dmoc.basics.arguments import checked, matching_length, number
+from dmoc.effects.base import Conservative
 from dmoc.effects.motion import given_motion, position_at
 
 
@@ -43,8 +43,11 @@ class ThirdBody(Conservative):
     position: Any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
-        object.__setattr__(self, "position", given_motion("ThirdBody", "position", self.position))
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            position=given_motion("ThirdBody", "position", self.position),
+        )
         if isinstance(self.position, tuple) and not any(self.position):
             raise ValueError(
                 f"ThirdBody: position must not be the origin [m]; got {self.position!r}: "
@@ -53,7 +56,7 @@ class ThirdBody(Conservative):
 
     def check_dimension(self, dimension: int) -> None:
         column = position_at(self.position, ca.SX.sym("t"), dimension)
-        need_dimension(self, "position", column.numel(), dimension)
+        matching_length(self, "position", column.numel(), dimension)
 
     def lagrangian(self, t, q, v, m):
         s = position_at(self.position, t, q.numel())

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.basics.cores import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
 from dmoc.sweeps.data import as_attributes, to_dataset, write
 from dmoc.sweeps.journal import Journal
@@ -133,15 +134,10 @@ def sweep(
 
 def _pool(workers: int | None, scheduler: str | None) -> Pool:
     if scheduler is None:
-        return LocalPool(workers or cores())
+        return LocalPool(workers or usable_cores())
     if workers is not None:
         raise ValueError("a scheduler has its own workers; leave out the number of workers")
     return SchedulerPool(scheduler)
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _facts(file: ProblemFile, plan: Plan, fixed: dict[str, Any], numerics: dict[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,6 @@ import pytest
 from scipy.integrate import DOP853, solve_ivp
 
 from dmoc import PointGravity, RotatingFrame, Spring, State, ThirdBody, TransferProblem
-from dmoc.basics.numerics import root
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import Spiral
 from dmoc.motion.dynamics import Dynamics
