@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.plain import unbroken
+
 # A number may be this large [in its SI unit]: products of six of them still stay below 1e308, where floating
 # point overflows, and nothing that moves comes near it.
 LARGEST = 1e50
@@ -121,11 +123,6 @@ def short(value: Any) -> str:
     """`value` as it is written, on one line that is not too long."""
     text = unbroken(repr(value))
     return text if len(text) <= SHORT else text[: SHORT - 3] + "..."
-
-
-def unbroken(text: Any) -> str:
-    """A text on one line, with one space wherever there was a break or more than one space."""
-    return " ".join(str(text).split())
 
 
 def _in(unit: str) -> str:

@@ -10,7 +10,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number, short, vector
 from dmoc.effects.base import Force, Part
-from dmoc.effects.motion import as_column, tried
+from dmoc.effects.given import as_column, tried
 
 # |w| is rounded to sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], so that drag has derivatives of every order at rest.
 SPEED_FLOOR = 1e-6

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, matching_length, number, short
 from dmoc.effects.base import Force, Part
-from dmoc.effects.motion import given_motion, position_at
+from dmoc.effects.given import given_motion, position_at
 
 SOLAR_PRESSURE = 4.56e-6  # [N/m^2] at one astronomical unit
 ASTRONOMICAL_UNIT = 149_597_870_700.0  # [m]

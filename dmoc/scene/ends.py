@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, same_length, short, vector
-from dmoc.effects.motion import as_column, tried
+from dmoc.effects.given import as_column, tried
 from dmoc.scene.rows import Row
 
 OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
 from dmoc.effects.base import Conservative, Effect
-from dmoc.effects.motion import evaluated
+from dmoc.effects.given import evaluated
 from dmoc.scene.actuator import Actuator
 from dmoc.scene.constraints import Constraint
 from dmoc.scene.ends import Boundary

@@ -1,9 +1,14 @@
-"""Values that JSON can hold."""
+"""Values made plain: text on one line, numbers that JSON can hold."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
+
+
+def unbroken(text: Any) -> str:
+    """A text on one line, with one space wherever it had a break or several spaces."""
+    return " ".join(str(text).split())
 
 
 def finite(value: Any) -> Any:
