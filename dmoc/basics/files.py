@@ -18,7 +18,7 @@ SEAL = b"\ndmoc sha256 "
 AGAIN = "copy it or write it again"
 
 
-def path_of(path: str | os.PathLike) -> Path:
+def as_path(path: str | os.PathLike) -> Path:
     """A path, or a ValueError if it is none."""
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"a file is named by a text or a path; got {short(path)}")
@@ -41,7 +41,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     OSError
         If the disk is full, say.
     """
-    target = path_of(path)
+    target = as_path(path)
     if not target.parent.is_dir():
         raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
     if target.exists() and not target.is_file():

@@ -29,7 +29,7 @@ from dmoc.cli.options import (
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
-    from dmoc.sweeps.loop import Progress
+    from dmoc.sweeps.loop import SweepProgress
 
 
 def sweep(
@@ -137,7 +137,7 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
 
 
 @contextmanager
-def _live(wanted: bool) -> Iterator[tuple[Progress, dict[str, int]]]:
+def _live(wanted: bool) -> Iterator[tuple[SweepProgress, dict[str, int]]]:
     """A `progress` that keeps one line of a terminal up to date, and what it was last told."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -130,16 +130,16 @@ def _example(planner: Planner, rollout: ca.Function, residual: ca.Function) -> s
     known = {"mass": problem.mass, "start_time": problem.start_time, "duration": guess.duration}
     known |= {name: planner.numbers.value(name) for name in scene.flow.name_in()[1:]}
     used = dict.fromkeys([*rollout.name_in(), *residual.name_in()])
-    numbers = [f"static casadi_real {name}[] = {{{_row(known[name])}}};" for name in used if name in known]
+    numbers = [f"static casadi_real {name}[] = {{{_c_values(known[name])}}};" for name in used if name in known]
     arrays = {"start_velocity": "velocity", "goal_velocity": "velocities + DMOC_AXES * DMOC_STEPS"}
     if scene.burns:
         numbers.append("static casadi_real masses[DMOC_NODES]; /* kg */")
     push = [force if label in ("x", "throttle") else 0.0 for label in problem.actuator.labels(scene.axes)]
     return EXAMPLE.format(
         name=_in_comment(problem.name),
-        position=_row(guess.position[0]),
-        velocity=_row(guess.start_velocity),
-        push=_row(push if any(push) else [force, *push[1:]]),
+        position=_c_values(guess.position[0]),
+        velocity=_c_values(guess.start_velocity),
+        push=_c_values(push if any(push) else [force, *push[1:]]),
         numbers="\n".join(numbers),
         start=", ".join(rollout.name_in()),
         path=", ".join(arrays.get(name, name) for name in residual.name_in()),
@@ -147,7 +147,7 @@ def _example(planner: Planner, rollout: ca.Function, residual: ca.Function) -> s
     ).replace('[m]:", duration)', '[m]:", duration[0])')
 
 
-def _row(values: Any) -> str:
+def _c_values(values: Any) -> str:
     return ", ".join(repr(float(value)) for value in np.atleast_1d(values))
 
 

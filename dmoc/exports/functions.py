@@ -184,7 +184,7 @@ def march(scene: Scene) -> ca.Function:
     return function.expand() if scene.explicit else function
 
 
-def step(scene: Scene) -> Exported:
+def one_step(scene: Scene) -> Exported:
     """The one-step map."""
     given = scene.symbols("position", "velocity", "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
@@ -201,7 +201,7 @@ def step(scene: Scene) -> Exported:
     return Exported(function.expand() if scene.explicit else function, words, terms)
 
 
-def rollout(scene: Scene) -> Exported:
+def all_steps(scene: Scene) -> Exported:
     """The integrator over all steps from the start."""
     given = scene.symbols("position", "velocity", "mass", "start_time", "duration", "forces")
     given |= scene.flow_numbers()

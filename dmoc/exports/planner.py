@@ -112,7 +112,7 @@ def cost(planner: Planner) -> Exported:
         if name in path or whole.jac_sparsity(0, i).nnz()
     }
     values = [used[name] if name in used else planner.numbers.value(name) for name in given]
-    terms = planner.numbers.terms | {"cost": Term(_unit(planner), "the objective, in its own sign")}
+    terms = planner.numbers.terms | {"cost": Term(_objective_unit(planner), "the objective, in its own sign")}
     return Exported(named("cost", used, {"cost": whole(*values)}), "the objective of a path", terms)
 
 
@@ -182,13 +182,13 @@ def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
     return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 
 
-def _unit(planner: Planner) -> str:
+def _objective_unit(planner: Planner) -> str:
     problem = planner.scene.problem
     return problem.objective.unit_with(problem.actuator)
 
 
 def _solver_terms(planner: Planner) -> dict[str, Term]:
-    unit = _unit(planner)
+    unit = _objective_unit(planner)
     terms = {
         "objective": Term(unit, "the objective, in its own sign"),
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),

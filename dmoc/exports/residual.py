@@ -52,14 +52,14 @@ def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     finish = scene.momentum(start_time + duration, q[:, -1], path["goal_velocity"], last_mass)
     arriving = ca.horzcat(begin, parts[-1][:, :-1])
     weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
-    ends = _times(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
+    ends = _scaled_rows(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
     ends = ca.horzcat(2 * ends[:, 0], ends[:, 1:])
-    inner = [_times(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
+    inner = [_scaled_rows(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
     rows = ca.reshape(ca.vertcat(ends, *inner), n, scene.nodes - 1) if inner else ends
     return ca.horzcat(rows, (parts[-1][:, -1] - finish) * last_mass / weight[0])
 
 
-def _times(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
+def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
     return rows * (factor if factor.is_scalar() else ca.repmat(factor, axes, 1))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
@@ -94,7 +94,7 @@ def value_words(value: Any, unit: str = "") -> str:
 
 def parameters(entries: Sequence[Parameter]) -> RenderableType:
     """The parameters of a problem file with defaults and units."""
-    table = _table("parameter", "default", "unit", "what it is")
+    table = plain_table(["parameter", "default", "unit", "what it is"])
     for entry in entries:
         default = value_words(entry.default) if not isinstance(entry.default, str) else repr(entry.default)
         table.add_row(entry.name, default, entry.unit, entry.description)
@@ -113,7 +113,9 @@ def sizes(nlp: NLP) -> RenderableType:
 def ladder(solution: Solution) -> RenderableType:
     """The meshes on the way, coarse to fine."""
     objective = f"objective [{solution.provenance.objective_unit}]"
-    table = _table("order", "steps", "iterations", objective, "build [s]", "solve [s]", "status", right=6)
+    table = plain_table(
+        ["order", "steps", "iterations", objective, "build [s]", "solve [s]", "status"], numbers=slice(6)
+    )
     estimated = any(level.error is not None for level in solution.ladder)
     if estimated:
         table.add_column("error [-]")
@@ -130,7 +132,7 @@ def ladder(solution: Solution) -> RenderableType:
 
 def checks(report: Report) -> RenderableType:
     """The checks, one line each."""
-    table = _table("check", "value", "limit", "unit", "verdict", "note")
+    table = plain_table(["check", "value", "limit", "unit", "verdict", "note"])
     for check in report.checks:
         if check.value is None:
             verdict = Text("does not apply", "dim")
@@ -153,7 +155,7 @@ def answer(
     if quiet:
         return last
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
-    return Group(*_meshes(solution), *_accuracy(solution), Text(), *verdicts, *_files(written), last)
+    return Group(*_ladder_lines(solution), *_estimate(solution), Text(), *verdicts, *_file_lines(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
@@ -163,12 +165,12 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
     advice = Text("The best iterate is kept." if stopped else f"What to try: {solution.message}.")
     if quiet:
         return Group(head, advice)
-    worst = _table("worst rows of the last iterate", "violation")
+    worst = plain_table(["worst rows of the last iterate", "violation"])
     # found by their scaled size, in which different units compare; shown in one's own, largest first
     units = [unit for _, _, unit in solution.worst]
     for name, violation, unit in sorted(solution.worst, key=lambda row: (units.index(row[2]), -row[1])):
         worst.add_row(name, f"{violation:.2e} {unit}")
-    return Group(*_meshes(solution), Text(), worst, Text(), *_files(written), head, advice)
+    return Group(*_ladder_lines(solution), Text(), worst, Text(), *_file_lines(written), head, advice)
 
 
 def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
@@ -234,11 +236,11 @@ def live_line(unit: str) -> Iterator[Callable | None]:
 NOT_MET = "The accuracy asked for is not met: this is the best that was found."
 
 
-def _meshes(solution: Solution) -> list[RenderableType]:
+def _ladder_lines(solution: Solution) -> list[RenderableType]:
     return [Text("Meshes, coarse to fine", "bold"), ladder(solution)]
 
 
-def _accuracy(solution: Solution) -> list[Text]:
+def _estimate(solution: Solution) -> list[Text]:
     """The estimated error and why this mesh, where a tolerance was asked for."""
     if solution.error is None:
         return []
@@ -247,7 +249,7 @@ def _accuracy(solution: Solution) -> list[Text]:
     return [Text(f"{solution.reason}; {words}"), *([Text(NOT_MET, "bold yellow")] if found > asked else [])]
 
 
-def _files(written: Sequence[Path]) -> list[Text]:
+def _file_lines(written: Sequence[Path]) -> list[Text]:
     return [Text(f"wrote {path}") for path in written]
 
 
@@ -261,9 +263,17 @@ def pairs(rows: Sequence[tuple[str, Any]]) -> Table:
     return table
 
 
-def _table(*columns: str, right: int = 0) -> Table:
-    """A plain table; the first `right` columns are numbers."""
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i < right else "left", no_wrap=i == 0)
+def plain_table(
+    columns: Sequence[str], numbers: slice = slice(0), unbroken: slice = slice(1), gap: int = 2
+) -> Table:
+    """A table without lines.
+
+    `numbers` are the columns that stand at the right, `unbroken` those that a narrow terminal must not
+    break into lines, `gap` the spaces between two columns.
+    """
+    table = Table(box=None, padding=(0, gap, 0, 0), header_style="bold")
+    at_the_right, whole = (set(columns[chosen]) for chosen in (numbers, unbroken))
+    for column in columns:
+        side: Literal["left", "right"] = "right" if column in at_the_right else "left"
+        table.add_column(column, justify=side, no_wrap=column in whole)
     return table

@@ -138,7 +138,7 @@ def work_precision(
     """
     if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
         raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
-    meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
+    meshes = _checked_meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
     others = dict(against)
     variants = [("", True), *([(COLD, False)] if cold else []), *([(COMPILED, True)] if compiled else [])]
     runs: list[tuple[tuple, Callable[[], Run]]] = [
@@ -152,7 +152,7 @@ def work_precision(
     ]
     runs += [
         ((name, None, count, False), partial(solve_other, problem, name, others[name], count))
-        for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
+        for name, counts in _checked_meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
         for count in counts
     ]
     value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
@@ -171,7 +171,7 @@ def _told(progress: Callable[[str], None] | None, labels: tuple, before: Callabl
     return run()
 
 
-def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+def _checked_meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
     """Numbers of steps by the name of the method, checked."""
     chosen = steps if isinstance(steps, Mapping) else {} if steps is None else dict.fromkeys(default, steps)
     meshes = default | {name: tuple(chosen[name]) for name in default if name in chosen}

@@ -29,7 +29,7 @@ PER_REVOLUTION: dict[str, Sequence[float]] = {
     ADAPTIVE: (1e-9,),
 }
 # Points of a history; as the errors are running maxima, none is lost between two of them.
-SAMPLES = 200
+HISTORY_POINTS = 200
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ def _growth(t: np.ndarray, error: np.ndarray) -> float:
 
 def _history(revolutions: np.ndarray, *errors: np.ndarray) -> np.ndarray:
     begin, end = min(1.0, revolutions[-1]), revolutions[-1]
-    places = np.unique(np.searchsorted(revolutions, np.geomspace(begin, end, SAMPLES)))
+    places = np.unique(np.searchsorted(revolutions, np.geomspace(begin, end, HISTORY_POINTS)))
     return np.stack([revolutions[places], *(np.maximum.accumulate(error)[places] for error in errors)])
 
 

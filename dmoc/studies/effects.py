@@ -121,9 +121,9 @@ def _one(problem: TransferProblem, path: DiscretePath, effect: Effect, name: str
     without = replace(problem, effects=alone)
     scene = problem if listed else replace(problem, effects=(*problem.effects, effect))
     ends = [
-        reference(Dynamics.of(case), path, case.start_time, path.start_velocity)[0] for case in (scene, without)
+        reference(Dynamics.of(each), path, each.start_time, path.start_velocity)[0] for each in (scene, without)
     ]
-    more, less = (_instructions(case, path) for case in (scene, without))
+    more, less = (_instructions(each, path) for each in (scene, without))
     slow, fast = _seconds(path, scene, without)
     return Influence(
         effect,
@@ -159,12 +159,12 @@ def _instructions(problem: TransferProblem, path: DiscretePath) -> int:
 def _seconds(path: DiscretePath, *problems: TransferProblem) -> np.ndarray:
     """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s]; they take turns."""
     taken = np.empty((REPEATS, len(problems)))
-    cases = []
+    evaluated = []
     for problem in problems:
         nlp = transcribe_onto(problem, path, units_of(problem, path))
-        cases.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
+        evaluated.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
     for turn in taken:
-        for i, (assembly, x, p, multipliers) in enumerate(cases):
+        for i, (assembly, x, p, multipliers) in enumerate(evaluated):
             begun = time.perf_counter()
             assembly.jacobian(x, p)
             assembly.hessian(x, p, 1.0, multipliers)

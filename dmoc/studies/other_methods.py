@@ -104,7 +104,7 @@ def as_nlp(problem: TransferProblem, made: Formulation, steps: int) -> Any:
     )
 
 
-def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
+def flown_path(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
     """The ends and controls a method found, in the form that the independent integrator takes."""
     ends, forces = (part.full() for part in ca.Function("read", [made.x], [made.ends, made.controls])(x))
     n, points = problem.dimension, np.array(made.points)
@@ -150,7 +150,7 @@ def solve_other(problem: TransferProblem, name: str, method: Method, steps: int)
         return made, result, solver.stats(), [*times, time.perf_counter()]
 
     (made, result, stats, (begun, ready, done)), calls = counted(solve_with)
-    path, nodes = path_of(problem, made, steps, result["x"])
+    path, nodes = flown_path(problem, made, steps, result["x"])
     objective, status = made.objective_unit * float(result["f"]), STATUS.get(stats["return_status"], "failed")
     return Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
 

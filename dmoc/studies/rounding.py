@@ -16,12 +16,12 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.studies.drift import step_function
 
 # Of the circular orbit that rounding is measured on: its radius, rate and mu are 1.
-PER_REVOLUTION = 1000
+STEPS_A_REVOLUTION = 1000
 FORMS = ("two-step form", "displacements", "compensated")
-METHODS = ("order 2", "order 4", "order 6", "order 8", "RK4", "DOP853")
+AMPLIFIED = ("order 2", "order 4", "order 6", "order 8", "RK4", "DOP853")
 # The one-step matrices are looked at for h omega up to this, so close that no gap is missed: the first
 # one of order 8 is 1e-3 wide.
-REACH = np.arange(1, 20_001) * 4e-4
+H_OMEGA = np.arange(1, 20_001) * 4e-4
 # Eigenvalues that meet on the unit circle are known to the root of rounding only.
 GROWS = 1 + 1e-6
 
@@ -47,7 +47,7 @@ class RoundOff:
 
 
 @dataclass(frozen=True)
-class Growth:
+class Amplification:
     """By how much one step of a method enlarges an oscillation at most.
 
     Attributes
@@ -85,12 +85,12 @@ def round_off(steps: int = 1_000_000) -> list[RoundOff]:
     ValueError
         If there are fewer than 1,000 steps.
     """
-    if number("steps", steps, "-") != int(steps) or steps < PER_REVOLUTION:
-        raise ValueError(f"steps must be a whole number of at least {PER_REVOLUTION}; got {steps:g}")
+    if number("steps", steps, "-") != int(steps) or steps < STEPS_A_REVOLUTION:
+        raise ValueError(f"steps must be a whole number of at least {STEPS_A_REVOLUTION}; got {steps:g}")
     here = State((1, 0), (0, 1))
-    duration = 2 * np.pi * steps / PER_REVOLUTION
-    case = TransferProblem(1.0, here, here, duration, effects=(PointGravity(1.0),))
-    plain, exact = (simulate(case, steps=steps, compensated=flag) for flag in (False, True))
+    duration = 2 * np.pi * steps / STEPS_A_REVOLUTION
+    problem = TransferProblem(1.0, here, here, duration, effects=(PointGravity(1.0),))
+    plain, exact = (simulate(problem, steps=steps, compensated=flag) for flag in (False, True))
     at = np.unique(np.geomspace(10, steps, 200).astype(int))
     paths = {
         FORMS[0]: two_step(steps),
@@ -112,7 +112,7 @@ def round_off(steps: int = 1_000_000) -> list[RoundOff]:
 
 def two_step(steps: int) -> tuple[np.ndarray, np.ndarray]:
     """The two-step form from (1, 0): places, shape (steps+1, 2), and angular momenta of the steps, (steps,)."""
-    h, pair = 2 * np.pi / PER_REVOLUTION, ca.SX.sym("pair", 4)
+    h, pair = 2 * np.pi / STEPS_A_REVOLUTION, ca.SX.sym("pair", 4)
     before, here = pair[:2], pair[2:]
     pull = -here / (ca.sqrt(ca.dot(here, here)) * ca.dot(here, here))
     step = ca.Function("step", [pair], [ca.vertcat(here, 2 * here - before + h**2 * pull)])
@@ -127,17 +127,17 @@ def _spin(place: np.ndarray, push: np.ndarray) -> np.ndarray:
     return place[:, 0] * push[:, 1] - place[:, 1] * push[:, 0]
 
 
-def growth() -> list[Growth]:
-    """Growth of one step of several methods on x'' = -omega^2 x, for many values of h omega."""
+def growth() -> list[Amplification]:
+    """Amplification of one step of several methods on x'' = -omega^2 x, for many values of h omega."""
     here = State((1,), (0,))
-    case = TransferProblem(1.0, here, here, 1.0, effects=(Spring(1.0, (0.0,)),))
-    dynamics, rows = Dynamics(1, case.effects), []
-    for name in METHODS:
-        step = step_function(name, dynamics, case).map(len(REACH))
+    problem = TransferProblem(1.0, here, here, 1.0, effects=(Spring(1.0, (0.0,)),))
+    dynamics, rows = Dynamics(1, problem.effects), []
+    for name in AMPLIFIED:
+        step = step_function(name, dynamics, problem).map(len(H_OMEGA))
         columns = [
-            step(np.tile(begin[:, None], len(REACH)), np.zeros((1, len(REACH))), REACH[None]).full()
+            step(np.tile(begin[:, None], len(H_OMEGA)), np.zeros((1, len(H_OMEGA))), H_OMEGA[None]).full()
             for begin in np.eye(2)
         ]
         rates = np.abs(np.linalg.eigvals(np.stack(columns, axis=1).T))
-        rows.append(Growth(name, REACH, rates.max(axis=1)))
+        rows.append(Amplification(name, H_OMEGA, rates.max(axis=1)))
     return rows

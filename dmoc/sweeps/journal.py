@@ -7,13 +7,14 @@ says what sweep it is. A line that was cut short, and what follows it, is solved
 from __future__ import annotations
 
 import json
-import math
 import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-FORMAT = "dmoc sweep journal"
+from dmoc.basics.plain import finite
+
+JOURNAL_FORMAT = "dmoc sweep journal"
 SUFFIX = ".journal"
 KEPT = "give --restart to begin anew, or another --out"
 
@@ -51,7 +52,7 @@ class Journal:
             raise ValueError(f"cannot write {out}: it is a folder; add a file name")
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            self._begin({"format": FORMAT, "version": 1, **facts}, restart)
+            self._begin({"format": JOURNAL_FORMAT, "version": 1, **facts}, restart)
         except BaseException:
             os.close(self._file)
             raise
@@ -69,7 +70,7 @@ class Journal:
 
     def append(self, wave: int, point: int, record: dict[str, Any], path: str | None) -> None:
         """Keep a finished point; it is on the disk when this returns."""
-        record = _finite(record)
+        record = finite(record)
         entry = {"wave": wave, "point": point, "record": record, "path": path}
         self._places[wave, point] = self._write(entry)
         self.records[wave, point] = record
@@ -100,7 +101,7 @@ class Journal:
     def _read(self, stream: Any, facts: dict[str, Any] | None) -> int:
         """Take over what is there, unless it is to be forgotten; where the good lines end."""
         head = stream.readline()
-        start = json.dumps({"format": FORMAT})[:-1].encode()
+        start = json.dumps({"format": JOURNAL_FORMAT})[:-1].encode()
         if not head.startswith(start) and not (start.startswith(head) and not head.endswith(b"\n")):
             raise ValueError(f"{self.path} is not the journal of a sweep; move it away, or give another --out")
         if facts is None or not head.endswith(b"\n"):
@@ -148,11 +149,11 @@ def differences(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
         elif isinstance(was, dict) and isinstance(now, dict):
             found += differences(was, now)
         else:
-            found.append(f"{name} was {_words(was)} and is now {_words(now)}")
+            found.append(f"{name} was {_value_in_words(was)} and is now {_value_in_words(now)}")
     return found
 
 
-def _words(value: Any) -> str:
+def _value_in_words(value: Any) -> str:
     if isinstance(value, list) and len(value) > 3:
         return f"{len(value)} values from {value[0]} to {value[-1]}"
     if isinstance(value, list):
@@ -169,16 +170,8 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
     return entry if isinstance(entry, dict) else None
 
 
-def _finite(record: dict[str, Any]) -> dict[str, Any]:
-    """Numbers that are not finite become null: JSON has no word for them."""
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in record.items()
-    }
-
-
 def _settle(folder: Path) -> None:
-    """The name of a new file on the disk too."""
+    """Wait until the names of new files in a folder are on the disk, which `fsync` of a file leaves open."""
     place = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(place)

@@ -11,10 +11,10 @@ from typing import Any
 from dmoc.sweeps.journal import Journal
 from dmoc.sweeps.plan import Plan
 from dmoc.sweeps.pool import Pool
-from dmoc.sweeps.retry import DIED, MOST_LOOKS, better, doubtful, next_to
-from dmoc.sweeps.worker import Task, failure
+from dmoc.sweeps.retry import DIED, MOST_LOOKS, better, first_retries, further_retries
+from dmoc.sweeps.worker import Task, failed_record
 
-Progress = Callable[[int, int, int], Any]
+SweepProgress = Callable[[int, int, int], Any]
 
 
 @dataclass
@@ -41,7 +41,7 @@ class Sweep:
     journal: Journal
     pool: Pool
     task: Callable[[int, str | None, bool], Task]
-    progress: Progress | None = None
+    progress: SweepProgress | None = None
     best: dict[int, tuple[int, dict[str, Any]]] = field(default_factory=dict)
     looks: Counter[int] = field(default_factory=Counter)
     tries: int = 0
@@ -50,12 +50,12 @@ class Sweep:
     def run(self, follow: bool) -> list[dict[str, Any]]:
         """All records, in the order of the points."""
         self._wave(0, {point: self.plan.before(point) if follow else None for point in range(self.plan.size)})
-        wave, again = 1, doubtful(self.plan, self._records(), follow)
+        wave, again = 1, first_retries(self.plan, self._records(), follow)
         while again:
             before = {point: self.best[point] for point in again}
             self._wave(wave, again)
             changed = {point: old for point, (at, old) in before.items() if self.best[point][0] != at}
-            again = next_to(self.plan, self._records(), changed, again)
+            again = further_retries(self.plan, self._records(), changed, again)
             again = {point: parent for point, parent in again.items() if self.looks[point] < MOST_LOOKS}
             wave += 1
         return self._records()
@@ -84,7 +84,7 @@ class Sweep:
                     continue
                 if alone:
                     suspects.popleft()
-                outcome = outcome or (failure(DIED, "its worker process ended, twice"), None)
+                outcome = outcome or (failed_record(DIED, "its worker process ended, twice"), None)
                 self.journal.append(wave, point, *outcome)
                 self._settle(wave, point)
                 ready.extend(children.pop(point, ()))

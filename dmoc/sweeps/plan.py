@@ -17,7 +17,7 @@ MOST_POINTS = 1_000_000
 # With `follow`, every so many points along the last axis one starts from the problem's own guess: a
 # wrong branch of local optima goes no further, and what lies apart can be solved at the same time.
 RUN = 8
-METHODS = ("sobol", "latin")
+SAMPLINGS = ("sobol", "latin")
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def _grid(parameter: Parameter, given: Any) -> np.ndarray:
     if not isinstance(given, str):
         values = list(given) if isinstance(given, Iterable) else [given]
     elif ":" in given and given.strip()[0] not in "'\"":
-        start, stop, count = _numbers(name, given, 3, "start:stop:count, for example 8:20:25")
+        start, stop, count = _numbers_of(name, given, 3, "start:stop:count, for example 8:20:25")
         if count != int(count) or not 1 <= count <= MOST_POINTS:
             raise ValueError(f"{name}: the count in {given!r} must be a whole number of at least 1")
         values = np.linspace(start, stop, int(count)).tolist()
@@ -190,8 +190,8 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
     """Points spread over the ranges, by columns."""
     from scipy.stats import qmc
 
-    if method not in METHODS:
-        raise ValueError(f"the method must be {' or '.join(METHODS)}; got {method!r}")
+    if method not in SAMPLINGS:
+        raise ValueError(f"the method must be {' or '.join(SAMPLINGS)}; got {method!r}")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POINTS:
         raise ValueError(f"a sample must have 1 to {MOST_POINTS} points; got {count!r}")
     for parameter in parameters:
@@ -209,7 +209,7 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
 
 def _range(name: str, given: Any) -> list[float]:
     if isinstance(given, str):
-        given = _numbers(name, given, 2, "start:stop in a sample, for example 8:20")
+        given = _numbers_of(name, given, 2, "start:stop in a sample, for example 8:20")
     try:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):
@@ -219,7 +219,7 @@ def _range(name: str, given: Any) -> list[float]:
     return [low, high]
 
 
-def _numbers(name: str, text: str, count: int, form: str) -> list[float]:
+def _numbers_of(name: str, text: str, count: int, form: str) -> list[float]:
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:

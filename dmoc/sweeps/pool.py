@@ -20,7 +20,7 @@ from dmoc.sweeps.worker import Task, solve_point
 
 # A sweep fills the cores with processes; threads of the linear algebra inside each would only get in the way.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-PATIENCE_S = 10
+ANSWER_WITHIN_S = 10
 UNGUARDED = (
     "the worker processes end as soon as they start; in a script, call sweep() below "
     'if __name__ == "__main__":, since every worker reads the script too'
@@ -127,11 +127,11 @@ class SchedulerPool:
         try:
             # a client that was never begun takes 20 s to end, and says so with a traceback
             parse_host_port(parse_address(address)[1])
-            self.client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+            self.client = Client(address, timeout=ANSWER_WITHIN_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ValueError(f"no scheduler answers at {address} ({error})") from None
         try:
-            self.client.wait_for_workers(1, timeout=PATIENCE_S)
+            self.client.wait_for_workers(1, timeout=ANSWER_WITHIN_S)
         except TimeoutError:
             self.client.close()
             raise ValueError(f"the scheduler at {address} has no workers; start some: dask worker") from None

@@ -19,7 +19,7 @@ from dmoc.sweeps.plan import Plan
 
 DIED = "worker died"
 # What another guess cannot help.
-HOPELESS = ("refused", DIED)
+BEYOND_HELP = ("refused", DIED)
 # Answers this close, relatively, are the same optimum.
 SAME = 1e-4
 MOST_LOOKS = 8
@@ -45,14 +45,14 @@ def better(new: Record, old: Record) -> bool:
     return tier < 2 and alike and value < old_value - SAME * abs(old_value)
 
 
-def doubtful(plan: Plan, records: Sequence[Record], follow: bool) -> dict[int, int]:
+def first_retries(plan: Plan, records: Sequence[Record], follow: bool) -> dict[int, int]:
     """Points to try again after the first look, each with the neighbour to start from.
 
     With `follow` also the points where two runs meet: what one run found may suit the other.
     """
     found = {}
     for point, record in enumerate(records):
-        if record["status"] in HOPELESS:
+        if record["status"] in BEYOND_HELP:
             continue
         sides, tier = plan.neighbours(point), rank(record)[0]
         others = [other for side in sides for other in side if rank(records[other])[0] < tier]
@@ -65,7 +65,7 @@ def doubtful(plan: Plan, records: Sequence[Record], follow: bool) -> dict[int, i
     return found
 
 
-def next_to(
+def further_retries(
     plan: Plan, records: Sequence[Record], changed: Mapping[int, Record], parents: Mapping[int, int]
 ) -> dict[int, int]:
     """Points to try after others became better, each with the best of those; `changed` has what they were.
@@ -77,7 +77,7 @@ def next_to(
         replaced = rank(old)[0] == rank(records[point])[0]
         for other in itertools.chain(*plan.neighbours(point)):
             useful = replaced or rank(records[other])[0] > rank(records[point])[0]
-            if useful and other != parents[point] and records[other]["status"] not in HOPELESS:
+            if useful and other != parents[point] and records[other]["status"] not in BEYOND_HELP:
                 found.setdefault(other, []).append(point)
     return {point: _best(others, records) for point, others in sorted(found.items())}
 

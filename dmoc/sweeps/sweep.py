@@ -12,9 +12,9 @@ import numpy as np
 
 from dmoc.basics.cores import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
-from dmoc.sweeps.data import as_attributes, to_dataset, write
+from dmoc.sweeps.data import as_attributes, sweep_dataset, write_sweep
 from dmoc.sweeps.journal import Journal
-from dmoc.sweeps.loop import Progress, Sweep
+from dmoc.sweeps.loop import Sweep, SweepProgress
 from dmoc.sweeps.plan import Plan, make_plan
 from dmoc.sweeps.pool import LocalPool, Pool, SchedulerPool
 from dmoc.sweeps.worker import Task
@@ -43,7 +43,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
-    progress: Progress | None = None,
+    progress: SweepProgress | None = None,
 ) -> Dataset:
     """Solve and verify a problem at many values of its parameters.
 
@@ -65,7 +65,7 @@ def sweep(
         By name of the parameter the values of the grid, or a text "start:stop:count" or
         "value,value,..."; for a sample a range (start, stop) or "start:stop". Units as documented there.
     out : path
-        The netCDF file to write.
+        The netCDF file to write_sweep.
     settings : mapping
         Values of other parameters.
     sample : int
@@ -126,8 +126,8 @@ def sweep(
             journal.remove()
             raise ValueError(f"every point was refused, the first with: {records[0]['message']}")
         created = {"created": datetime.now(UTC).isoformat(timespec="seconds")}
-        data = to_dataset(plan, records, as_attributes(facts) | created)
-        write(data, out)
+        data = sweep_dataset(plan, records, as_attributes(facts) | created)
+        write_sweep(data, out)
         journal.remove()
     return data
 

@@ -9,7 +9,7 @@ import dmoc
 from dmoc.cli.app import main
 from dmoc.plots.front import pareto
 from dmoc.plots.sweep import figure, save_sweep
-from dmoc.sweeps.data import is_sweep, read, to_dataset, write
+from dmoc.sweeps.data import is_sweep, read_sweep, sweep_dataset, write_sweep
 
 
 def picture(plan, value, **more):
@@ -22,7 +22,7 @@ def picture(plan, value, **more):
             solved | {"objective_unit": "N^2 s", "effort": objective, "duration": 1.0, "propellant": 0.0}
         )
         records[-1] |= {name: function(plan.at(point)) for name, function in more.items()}
-    return to_dataset(plan, records, {"problem": "a_push", "settings": "{}"})
+    return sweep_dataset(plan, records, {"problem": "a_push", "settings": "{}"})
 
 
 def test_one_parameter_is_a_curve_with_failures_marked(tmp_path):
@@ -81,7 +81,7 @@ def test_the_front_is_what_no_other_beats_in_both():
 
 
 def test_dmoc_plot_knows_a_sweep(tmp_path, capfd):
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "out.nc")
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "out.nc")
     with pytest.raises(SystemExit) as end:
         main(["plot", str(tmp_path / "out.nc")])
     assert not end.value.code and "out.png" in capfd.readouterr().out
@@ -100,19 +100,19 @@ def test_other_files_are_told_apart(tmp_path):
         (tmp_path / "none.nc", "not exist"),
     ):
         with pytest.raises(ValueError, match=words):
-            read(path)
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
+            read_sweep(path)
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
     with pytest.raises(ValueError, match=r"result of a sweep; draw it with: dmoc plot"):
         dmoc.load(tmp_path / "sweep.nc")
 
 
 def test_a_damaged_sweep_is_refused_before_anything_opens_it(tmp_path, capfd):
     path = tmp_path / "out.nc"
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), path)
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), path)
     whole, random = path.read_bytes(), np.random.default_rng(0)
     for place in random.integers(len(whole), size=40):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 255]) + whole[place + 1 :])
-        for reader in (read, is_sweep):
+        for reader in (read_sweep, is_sweep):
             with pytest.raises(ValueError, match="is damaged: its checksum does not hold"):
                 reader(path)
     with pytest.raises(SystemExit) as end:
@@ -120,13 +120,13 @@ def test_a_damaged_sweep_is_refused_before_anything_opens_it(tmp_path, capfd):
     assert end.value.code == 2
     assert len(capfd.readouterr().err.splitlines()) == 1
     path.write_bytes(whole)
-    assert read(path).identical(picture(plan_of(4), lambda at: 1 + at["p0"]))
+    assert read_sweep(path).identical(picture(plan_of(4), lambda at: 1 + at["p0"]))
 
 
 def test_a_sweep_of_the_first_format_has_no_checksum_and_loads(tmp_path):
     path, data = tmp_path / "out.nc", picture(plan_of(4), lambda at: 1 + at["p0"])
     data.assign_attrs(format_version=1).to_netcdf(path, engine="h5netcdf")
-    assert is_sweep(path) and read(path).sizes == data.sizes
+    assert is_sweep(path) and read_sweep(path).sizes == data.sizes
     data.to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match="lacks its checksum"):
-        read(path)
+        read_sweep(path)
