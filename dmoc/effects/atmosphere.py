@@ -12,7 +12,8 @@ from dmoc.basics.arguments import checked, matching_length, number, short, vecto
 from dmoc.effects.base import Force, Part
 from dmoc.effects.given import as_column, tried
 
-# |w| is rounded to sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], so that drag has derivatives of every order at rest.
+# Drag computes the speed |w| against the air as sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], which has derivatives of
+# every order at rest too; a micrometre a second changes no force that matters.
 SPEED_FLOOR = 1e-6
 
 
@@ -49,7 +50,17 @@ class Wind(Part):
 
 
 class Atmosphere(Part, ABC):
-    """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own."""
+    """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own.
+
+    Whoever implements an atmosphere
+
+    1. gives `density_at` with CasADi operations alone, smooth, never negative, and finite at places where only
+       a guess goes, such as the inside of a planet;
+    2. gives `velocity_at` if the air moves: wind, or rotation with the planet;
+    3. overrides `check_dimension` where it has no meaning in one, two or three dimensions.
+
+    Not its business: the force, which `Drag` makes of density and velocity, and the body's area.
+    """
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the atmosphere has no meaning in this many dimensions."""
@@ -155,7 +166,8 @@ class ExponentialAtmosphere(Atmosphere):
             self.wind.check_dimension(dimension)
 
     def density_at(self, t: Any, q: Any) -> Any:
-        # the second term vanishes by rounding outside of the sphere, and gives the root a slope at its centre
+        # at the centre of the sphere the square root alone has no derivative; the second term gives it one, and
+        # is lost in rounding outside of the sphere
         distance = ca.sqrt(ca.dot(q, q) + (1e-9 * self.radius) ** 2)
         above = ca.fmax(distance - self.radius, -5 * self.scale_height)
         return self.density * ca.exp((self.height - above) / self.scale_height)

@@ -26,10 +26,11 @@ def given_motion(owner: str, name: str, value: Any) -> Any:
 
 
 def tried(name: str, function: Any, symbols: list, remedy: str) -> int:
-    """How many entries a user's function of CasADi symbols gives; ValueError if it fails or gives NaN."""
+    """How many entries a user's function of CasADi symbols gives; ValueError if it fails or gives only NaN."""
     column = evaluated(name, function, symbols, remedy)
     probe = ca.Function("probe", symbols, [ca.densify(ca.sum1(column))])
-    # Python's own math turns a symbol into NaN without a word; a good function may be undefined somewhere
+    # Python's own math functions may turn a symbol into NaN without an error. A good function may be undefined
+    # at some of these places [s and m], but not at all of them
     places = [0.0, 0.37, 1.0, 1e3, 1e6]
     if all(np.isnan(float(probe(*[x] * len(symbols)))) for x in places):
         raise ValueError(f"{name} gives no number; {remedy}")
@@ -49,7 +50,10 @@ def evaluated(name: str, function: Any, symbols: list, remedy: str) -> Any:
 
 
 def position_at(motion: Any, t: Any, dimension: int) -> Any:
-    """The position [m] of a motion, or a fixed one, with as many entries as the problem has axes if it can."""
+    """The position [m] of a motion, or a fixed one, as a column.
+
+    In the plane a third entry that is zero is left out.
+    """
     column = as_column(motion(t) if callable(motion) else motion)
     return column[:2] if dimension == 2 and column.numel() == 3 and column[2].is_zero() else column
 

@@ -58,7 +58,7 @@ class PointGravity(Conservative):
 
     def lagrangian(self, t, q, v, m):
         offset = q if self.center is None else q - ca.DM(self.center)
-        # sqrt and multiplication: a power of 3/2 in the derivative would dominate the step function
+        # a square root and products, since a power of 3/2 takes longer than all the rest of a step
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 
 

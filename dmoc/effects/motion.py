@@ -192,7 +192,8 @@ class KeplerMotion(Part):
     def __call__(self, t: Any) -> Any:
         e, mean = self.e, self.mean_anomaly + math.sqrt(self.mu / self.a) / self.a * t
         anomaly = mean + e * ca.sin(mean) / ca.sqrt(1 - 2 * e * ca.cos(mean) + e * e)
-        # convergence is quadratic: two iterations reach round-off up to e = 0.3, six up to 0.99
+        # the number of iterations is fixed, so that the expression is one for all times. Newton's method
+        # doubles the digits: two iterations reach round-off up to e = 0.3, six up to 0.99
         for _ in range(2 if e <= 0.3 else 6):
             anomaly -= (anomaly - e * ca.sin(anomaly) - mean) / (1 - e * ca.cos(anomaly))
         along = self.a * (ca.cos(anomaly) - e)
@@ -227,7 +228,8 @@ class TabulatedMotion(Part):
     def __post_init__(self) -> None:
         try:
             times, positions = np.asarray(self.times, float), np.asarray(self.positions, float)
-        except Exception:  # whatever a user's objects raise
+        except Exception:
+            # the conversion of a user's own objects may raise anything
             raise ValueError("times and positions must be numbers [s], [m]") from None
         if times.ndim != 1 or len(times) < 4 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError(
@@ -254,6 +256,6 @@ class TabulatedMotion(Part):
 
     def __call__(self, t: Any) -> Any:
         position, slope = self._spline
-        # CasADi's spline is zero outside of its table: straight on instead, with a continuous slope
+        # CasADi's spline is zero outside of its table; the motion goes on straight ahead there instead
         inside = ca.fmin(ca.fmax(t, self.times[0]), self.times[-1])
         return position(inside) + slope(inside) * (t - inside)

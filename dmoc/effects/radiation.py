@@ -13,13 +13,26 @@ from dmoc.basics.arguments import checked, matching_length, number, short
 from dmoc.effects.base import Force, Part
 from dmoc.effects.given import given_motion, position_at
 
-SOLAR_PRESSURE = 4.56e-6  # [N/m^2] at one astronomical unit
-ASTRONOMICAL_UNIT = 149_597_870_700.0  # [m]
-NEAREST_SUN = 1e9  # [m]; what is nearer is a direction or not in metres
+# Pressure of sunlight on a black surface at one astronomical unit from the sun [N/m^2].
+SOLAR_PRESSURE = 4.56e-6
+# The mean distance of Earth and sun [m], exact by definition (IAU 2012).
+ASTRONOMICAL_UNIT = 149_597_870_700.0
+# A sun nearer to the origin than this [m] is refused: it must be a direction, or a position in other units, as
+# the sun alone has a radius of 7e8 m.
+NEAREST_SUN = 1e9
 
 
 class Shadow(Part, ABC):
-    """The shadow of a sphere at the origin; derive from this, as a frozen dataclass, for one of your own."""
+    """The shadow of a sphere at the origin; derive from this, as a frozen dataclass, for one of your own.
+
+    Whoever implements a shadow gives `light`
+
+    1. between 0 and 1, with CasADi operations alone, for columns of two and of three entries;
+    2. with an edge of some width, since a jump has no derivative; a step of the path must not be longer;
+    3. finite everywhere, also inside of the sphere, where only a guess goes.
+
+    Not its business: the pressure, which `RadiationPressure` multiplies by the light, and where the sun is.
+    """
 
     @abstractmethod
     def light(self, q: Any, sun: Any) -> Any:
@@ -97,9 +110,10 @@ class ConicalShadow(Shadow):
         offset = sun - q
         distance = ca.sqrt(ca.dot(offset, offset))
         behind, across = _behind(q, offset / distance)
-        # rounded by a thousandth of the radius on the axis, by half a millionth of it at the limb
+        # the angle between the two centres. The second term rounds it: by a thousandth of the radius on the axis,
+        # where the angle alone has no derivative, and by half a millionth of the radius at the edge
         apart = ca.atan2(ca.sqrt(across + (1e-3 * self.radius) ** 2), behind)
-        # inside of the sphere, where only a guess goes, it fills half the sky
+        # inside of the sphere, where only a guess goes, the sphere is taken to fill half the sky
         beyond = ca.fmax(ca.dot(q, q) - self.radius**2, (1e-3 * self.radius) ** 2)
         sphere, disc = ca.atan2(self.radius, ca.sqrt(beyond)), ca.atan(self.sun_radius / distance)
         small, large = ca.fmin(sphere, disc), ca.fmax(sphere, disc)

@@ -62,7 +62,7 @@ class ThirdBody(Conservative):
         s = position_at(self.position, t, q.numel())
         offset, distance = s - q, ca.dot(s, s)
         x = ca.dot(q, q - 2 * s) / distance
-        # from the offset, not from x: close to the third body 1 + x would lose digits
+        # the same as sqrt(1 + x), but close to the third body, where x is near -1, the sum would lose digits
         ratio = ca.sqrt(ca.dot(offset, offset) / distance)
         tide = x * x * (ratio + 2) / (ratio * (1 + ratio) * (1 + ratio))
         return 0.5 * self.mu / ca.sqrt(distance) * (tide - ca.dot(q, q) / distance)

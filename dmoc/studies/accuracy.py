@@ -29,8 +29,8 @@ from dmoc.solver.tolerance import path_scales
 from dmoc.studies.other_methods import Formulation as Formulation
 from dmoc.studies.other_methods import Method, Run, counted, solve_other
 
-# By order, the numbers of steps that are solved unless others are asked for: they span the errors of `TARGETS` as
-# far as an order gets there in well under a second.
+# By order, the numbers of steps that are solved unless others are asked for: they span the errors of `TARGETS`,
+# as far as an order gets there in well under a second.
 STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 48, 96), 8: (8, 16, 32, 64)}
 # Numbers of steps for methods of other people, most of which are of order 2 to 4.
 OTHER_STEPS = (25, 50, 100, 200, 400)
@@ -41,7 +41,7 @@ REFERENCE_STEPS = 100
 COLD = ", cold"
 # What the name of a method ends with where its functions are machine code.
 COMPILED = ", compiled"
-# The time is interpolated for these relative errors of the objective [-], from a sketch to all digits one reads.
+# The time is interpolated for these relative errors of the objective [-], from a sketch to all digits shown.
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
 # The reference objective is taken to be known to this relative error [-] at best, however little it changed.
 LEAST_ERROR = 1e-14

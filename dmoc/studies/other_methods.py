@@ -172,7 +172,7 @@ def solve_other(problem: TransferProblem, name: str, method: Method, steps: int)
 
 
 def counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
-    """What a solve gives, and how many evaluations it took on all meshes, as Ipopt prints at the end of each."""
+    """What a solve gives, and how many evaluations it took on all meshes, as Ipopt prints after each."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "ipopt.txt"
         print_to = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}

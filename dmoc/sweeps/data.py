@@ -17,6 +17,7 @@ from dmoc.sweeps.plan import Plan
 if TYPE_CHECKING:
     from xarray import Dataset
 
+# The name and version by which a file of this kind is known, and what is told where a file is none.
 SWEEP_FILE = Format("dmoc sweep", 2, "the result of a sweep", "sweeps are written by dmoc sweep")
 
 
@@ -29,6 +30,7 @@ class Column:
     words: str
 
 
+# The variables of the result; a record that lacks one has the empty value there.
 COLUMNS = {
     "objective": Column(np.nan, "", "objective; not a number where not solved"),
     "duration": Column(np.nan, "s", "duration found"),
@@ -96,7 +98,7 @@ def _stored(data: Dataset, name: str) -> tuple:
     about = dict(variable.attrs)
     if variable.dtype == bool:
         about["dtype"] = "bool"
-    # coordinates that are no dimension are named by the variables that they belong to
+    # CF conventions: a variable names the coordinates that are not dimensions themselves, as in a sample
     along = [str(other) for other in data.coords if other not in data.dims]
     if along and name not in data.coords:
         about["coordinates"] = " ".join(along)

@@ -14,8 +14,11 @@ from typing import Any
 
 from dmoc.basics.plain import finite
 
+# The first line of a journal names this format: a file that does not is never written over.
 JOURNAL_FORMAT = "dmoc sweep journal"
+# A journal is named like the result file, with this at the end.
 SUFFIX = ".journal"
+# The remedy that is told where a journal belongs to another sweep.
 KEPT = "give --restart to begin anew, or another --out"
 
 try:
@@ -64,7 +67,7 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if not self.records and self.path.exists():
-            # nothing to go on from, so nothing to be refused for later
+            # no point was finished: an empty journal would only have the next sweep refused
             self.path.unlink()
         os.close(self._file)
 
@@ -99,13 +102,15 @@ class Journal:
             _settle(self.path.parent)
 
     def _read(self, stream: Any, facts: dict[str, Any] | None) -> int:
-        """Take over what is there, unless it is to be forgotten; where the good lines end."""
+        """Take over the records of an earlier run, unless `facts` is None; where the good lines end."""
         head = stream.readline()
+        # what every journal begins with, up to the comma: a head that was cut short is the beginning of it
         start = json.dumps({"format": JOURNAL_FORMAT})[:-1].encode()
         if not head.startswith(start) and not (start.startswith(head) and not head.endswith(b"\n")):
             raise ValueError(f"{self.path} is not the journal of a sweep; move it away, or give another --out")
         if facts is None or not head.endswith(b"\n"):
             return 0
+        # `facts` through JSON and back: tuples become lists, as they are in the file
         if changes := differences(_parsed(head) or {}, json.loads(json.dumps(facts))):
             raise ValueError(f"{self.path} belongs to another sweep: {'; '.join(changes)}; {KEPT}")
         end = len(head)

@@ -13,10 +13,14 @@ import numpy as np
 
 from dmoc.scene.problem_file import Parameter, ProblemFile
 
+# A sweep has at most this many points: with solves of 0.1 s they take a day of one core, and a typing error in
+# a count is told before the work begins.
 MOST_POINTS = 1_000_000
-# With `follow`, every so many points along the last axis one starts from the problem's own guess: a
-# wrong branch of local optima goes no further, and what lies apart can be solved at the same time.
+# With `follow`, a point starts from the answer of the one before it along the last axis, except every 8th,
+# which starts from the problem's own guess: a wrong branch of local optima then spoils 8 points at most, and
+# several runs of 8 points can be solved at the same time.
 RUN = 8
+# How a sample can be spread over its ranges.
 SAMPLINGS = ("sobol", "latin")
 
 
@@ -64,6 +68,7 @@ class Plan:
             far = np.sum((self._cube - self._cube[point]) ** 2, axis=1)
             nearest = np.argsort(far, kind="stable")
             return [[int(other) for other in nearest if other != point][: 2 * len(self.values)]]
+        # points are numbered as in a C-ordered array: a step along a dimension adds its stride to the number
         stride, found = self.size, []
         for length, values in zip(self.shape, self.values, strict=True):
             stride //= length
@@ -187,7 +192,7 @@ def _checked(parameter: Parameter, values: list) -> np.ndarray:
 
 
 def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) -> tuple[np.ndarray, ...]:
-    """Points spread over the ranges, by columns."""
+    """Points spread over the ranges: one array a parameter, with its value at every point."""
     from scipy.stats import qmc
 
     if method not in SAMPLINGS:
@@ -201,7 +206,7 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
     if method == "latin":
         unit = qmc.LatinHypercube(len(ranges), seed=seed).random(count)
     else:
-        # the whole power of two that holds them: its first points are spread as well as any
+        # Sobol points come in powers of two; the first `count` of the next larger one are spread as evenly
         unit = qmc.Sobol(len(ranges), seed=seed).random_base2((count - 1).bit_length())[:count]
     low, high = np.array(ranges).T
     return tuple((low + unit * (high - low)).T.copy())

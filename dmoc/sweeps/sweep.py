@@ -22,7 +22,7 @@ from dmoc.sweeps.worker import Task
 if TYPE_CHECKING:
     from xarray import Dataset
 
-# More processes than any computer has use for.
+# A sweep takes at most this many worker processes: more than any computer has cores.
 MOST_WORKERS = 4096
 
 

@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
 
+# In a packed path the names of multipliers begin with this, so that they cannot be taken for those of a field.
 MULTIPLIER = "multiplier "
-# A scheduler may give its workers several threads; one process solves one point at a time all the same.
+# A process solves one point at a time, also where a scheduler runs several threads in it: the output of a
+# point is redirected, which is done for the whole process.
 _TURN = threading.Lock()
 
 
