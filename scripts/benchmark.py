@@ -46,7 +46,9 @@ from dmoc.nlp.transcription import transcribe_onto, units_of
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
+# The true optima, by indirect shooting or the controllability Gramian, to the digits shown.
 OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
+# Methods are compared by the time they take to this relative error of the objective [-].
 TARGET = 1e-6
 # What a solve finds of those before it.
 STATES: dict[str, Callable[[], None]] = {
@@ -54,11 +56,12 @@ STATES: dict[str, Callable[[], None]] = {
     "new process": partial(dmoc.basics.memory.forget, files=True),
     "same process": lambda: None,
 }
+# The order of every method, from which the number of steps for TARGET is estimated.
 ORDERS = {"order 2": 2, "order 4": 4, "order 6": 6, "order 8": 8}
 OTHERS = METHODS | {f"Radau {d}": partial(radau, degree=d) for d in (2, 3, 4, 5, 7)}
 ORDERS |= {"plain": 2, "trapezoid": 2, "RK4 shooting, held": 2, "RK4 shooting": 4, "Hermite-Simpson": 4}
 ORDERS |= {f"Radau {d}": 2 * d - 1 for d in (2, 3, 4, 5, 7)}
-# Steps of a first solve at each order, from whose error the number of steps for TARGET follows.
+# By order, steps of a first solve; the number of steps for TARGET follows from its error and the order.
 PILOT = {2: 800, 3: 100, 4: 60, 5: 30, 6: 16, 7: 12, 8: 10, 9: 8, 13: 5}
 
 

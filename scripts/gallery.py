@@ -27,9 +27,15 @@ from dmoc.studies.rounding import growth, round_off
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"
-DPI = 90  # 1200 pixels wide
+# Dots an inch: at 13.33 inches a picture is 1200 pixels wide, as wide as a page shows it.
+DPI = 90
+# A picture of more bytes than this is stored with a palette of 256 colours.
 LARGEST = 250_000
-LONG_RUNS, SWEEP = "stability", "sweep"
+# The argument that stands for the long runs, and the name of their picture.
+LONG_RUNS = "stability"
+# The argument that stands for the sweep, and the name of its picture.
+SWEEP = "sweep"
+# What is varied in the sweep: duration [s] and angle [rad] of orbit_raise, 525 points.
 VARIED = {"duration": "5:17:25", "angle": "4:14:21"}
 
 

@@ -40,7 +40,7 @@ from dmoc.cli.options import (
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
-# Typer exports only one of its usage errors; this is the class of all of them.
+# The class of all usage errors. Typer exports only one that derives from it.
 USAGE_ERROR: Any = typer.BadParameter.__base__
 
 app = typer.Typer(

@@ -21,10 +21,19 @@ if TYPE_CHECKING:
     from dmoc.results.solution import Solution
     from dmoc.scene.problem_file import ProblemFile
 
-# A switch takes no value, so the help shows none beside it.
+# An option that takes no value; without the empty metavar the help would show its type beside it.
 switch = partial(typer.Option, metavar="")
 
-SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+# Exit code where all is well: solved, and every check holds.
+SOLVED = 0
+# Exit code where the input has no meaning; nothing was solved.
+BAD_INPUT = 2
+# Exit code where no optimum was found.
+NOT_SOLVED = 3
+# Exit code where an optimum was found but a check of it fails.
+CHECK_FAILED = 4
+# Exit code after Ctrl-C: 128 and the number of the signal, as shells have it.
+INTERRUPTED = 130
 
 
 def names_like(begun: str) -> list[str]:
@@ -48,6 +57,7 @@ Name = Annotated[
         metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
     ),
 ]
+# What a FILE on the command line is, in the help of several commands.
 SAVED = "A solution saved with `dmoc solve --out`"
 File = Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}.")]
 Source = Annotated[
@@ -118,7 +128,7 @@ def attached(path: Path, source: str | None) -> Solution:
         )
     file = load_problem(source or known.problem_name)
     attached = solution.attach(file.make(**known.parameters))
-    # what was saved from Python does not say which file it was made from
+    # a solution that was saved from Python has no hash: there may have been no problem file
     if known.source_hash and known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
     return attached

@@ -74,36 +74,26 @@ def sweep(
     """
     from dmoc.scene.problem_file import parse_settings
     from dmoc.sweeps import sweep as sweeping
-    from dmoc.sweeps.journal import journal_of
     from dmoc.sweeps.plan import parse_vary
 
     writable(out)
     begun = time.perf_counter()
-    with _live(not quiet) as (progress, tries):
-        try:
-            data = sweeping.sweep(
-                problem,
-                parse_vary(vary),
-                out,
-                settings=parse_settings(settings or ()),
-                sample=sample,
-                method=method,
-                seed=seed,
-                order=order,
-                steps=steps,
-                tol=tol,
-                hold=hold,
-                follow=follow,
-                workers=workers,
-                scheduler=scheduler,
-                restart=restart,
-                progress=progress,
-            )
-        except KeyboardInterrupt:
-            if (journal := journal_of(out)).exists():
-                words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
-                print(f"{words}; give the same command again to go on", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED) from None
+    numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
+    spread: dict[str, Any] = {"sample": sample, "method": method, "seed": seed}
+    with _live(not quiet) as (progress, tries), _says_what_is_kept(out, tries):
+        data = sweeping.sweep(
+            problem,
+            parse_vary(vary),
+            out,
+            settings=parse_settings(settings or ()),
+            follow=follow,
+            workers=workers,
+            scheduler=scheduler,
+            restart=restart,
+            progress=progress,
+            **numerics,
+            **spread,
+        )
     raise typer.Exit(_show(data, out, time.perf_counter() - begun, tries["done"] - tries["before"], quiet))
 
 
@@ -134,6 +124,20 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
     checks = "" if not broken else f" Checks fail at {broken} of them ({named}), see failed_check."
     console.print(Text(words + failed + checks, "yellow" if solved < success.size or broken else "green"))
     return NOT_SOLVED if solved < success.size else CHECK_FAILED if broken else SOLVED
+
+
+@contextmanager
+def _says_what_is_kept(out: Path, tries: dict[str, int]) -> Iterator[None]:
+    """Ctrl-C ends the program with a word on how many points are kept, if any are."""
+    from dmoc.sweeps.journal import journal_of
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if (journal := journal_of(out)).exists():
+            words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
+            print(f"{words}; give the same command again to go on", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
 
 
 @contextmanager

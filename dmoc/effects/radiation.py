@@ -110,8 +110,8 @@ class ConicalShadow(Shadow):
         offset = sun - q
         distance = ca.sqrt(ca.dot(offset, offset))
         behind, across = _behind(q, offset / distance)
-        # the angle between the two centres. The second term rounds it: by a thousandth of the radius on the axis,
-        # where the angle alone has no derivative, and by half a millionth of the radius at the edge
+        # the angle between the two centres. The second term rounds it: by a thousandth of the radius on the
+        # axis, where the angle alone has no derivative, and by half a millionth of the radius at the edge
         apart = ca.atan2(ca.sqrt(across + (1e-3 * self.radius) ** 2), behind)
         # inside of the sphere, where only a guess goes, the sphere is taken to fill half the sky
         beyond = ca.fmax(ca.dot(q, q) - self.radius**2, (1e-3 * self.radius) ** 2)

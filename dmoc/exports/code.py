@@ -13,6 +13,7 @@ import numpy as np
 from dmoc.exports.functions import Exported, Scene
 from dmoc.exports.planner import Planner
 
+# What stands before CasADi's own code.
 PREFACE = """\
 /* CasADi lends the addresses of local variables to the functions it calls; GCC 12 and later take some for
    addresses that outlive the call. */
@@ -21,8 +22,10 @@ PREFACE = """\
 #endif
 """
 
+# What a C file or header of CasADi ends with if it was written whole.
 LAST_LINES = '} /* extern "C" */\n#endif\n'
 
+# The header that documents the functions.
 HEADER = """\
 /* {name}: {about}
 {documentation}
@@ -40,6 +43,7 @@ HEADER = """\
 #endif
 """
 
+# A program that calls two of them.
 EXAMPLE = """\
 /* Roll out a constant force from the start of {name}, then check the path that comes out.
    Build and run: cc -O2 main.c functions.c -lm -o transfer && ./transfer */
@@ -82,7 +86,7 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
         generator.add(exported.function)
     generator.generate(f"{folder}{os.sep}")
     for name in ("functions.c", "functions.h"):
-        # CasADi does not say when the disk is full
+        # CasADi raises no error when the disk is full
         if not (folder / name).read_text().endswith(LAST_LINES):
             raise OSError(f"{name} could not be written whole")
     source = folder / "functions.c"

@@ -29,7 +29,9 @@ from dmoc.motion.lobatto import scheme
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.solve import DEFAULT_STEPS
 
+# The manifest names this format: a folder whose manifest does not is never written over.
 EXPORT_FORMAT = "dmoc export"
+# The version of the manifest, for programs that read it.
 EXPORT_VERSION = 1
 
 

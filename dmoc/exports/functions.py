@@ -42,6 +42,7 @@ class Exported:
         return self.terms.get(name) or TERMS[name]
 
 
+# Unit and meaning of every argument that has one name in all functions.
 TERMS = {
     "position": Term("m", "position"),
     "velocity": Term("m/s", "velocity"),
@@ -174,7 +175,8 @@ def march(scene: Scene) -> ca.Function:
         masses = masses - h * (ca.DM(rule.integral) @ ca.vertcat(*flows))
     t = start_time + count * h
     dq, dp, v = step_map(scene.dynamics, rule, scene.hold)(r, p, masses, u, t, h, origin)
-    # the polynomial of a step is the integral of its slope, which s + 1 points determine
+    # positions at the inner nodes: the position in a step is a polynomial of degree s, whose slope is known at
+    # all s + 1 nodes, so that integrating the slope gives it exactly
     inner = [r + h * (v @ ca.DM(row)) for row in rule.integral[1:-1]]
     end = ca.vertcat(r + dq, p + dp, masses[-1], count + 1)
     velocity = scene.dynamics.velocity(t + h, origin + r + dq, p + dp, masses[-1])

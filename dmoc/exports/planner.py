@@ -44,6 +44,7 @@ class Planner:
     @cached_property
     def multipliers(self) -> dict[str, np.ndarray]:
         """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
+        # the way from scaled to SI multipliers is linear: what it makes of ones are the factors themselves
         columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
         answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0, 0.0)
         return self.by_name(path_of(self.nlp, self.scene.problem, answer).multipliers)
@@ -128,6 +129,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
     x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
     found = make_solver(nlp, options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
+    # how far unknowns and rows are beyond their bounds, all scaled
     both = ca.vertcat(found["x"], found["g"])
     beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
@@ -178,7 +180,7 @@ def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
 
 
 def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
-    """The largest value, at least 0; infinite if what is to be finite is not: a maximum passes over NaN."""
+    """The largest value, at least 0; infinite if `finite` is not, for a maximum in CasADi passes over NaN."""
     return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 
 

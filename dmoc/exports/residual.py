@@ -52,6 +52,8 @@ def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     finish = scene.momentum(start_time + duration, q[:, -1], path["goal_velocity"], last_mass)
     arriving = ca.horzcat(begin, parts[-1][:, :-1])
     weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
+    # at a node between two steps the force acts for the end of one and the beginning of the other, so its row
+    # is divided by twice the weight; at the start of the path it acts for one of them, hence the factor 2
     ends = _scaled_rows(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
     ends = ca.horzcat(2 * ends[:, 0], ends[:, 1:])
     inner = [_scaled_rows(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
@@ -60,6 +62,7 @@ def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
 
 
 def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
+    """Rows times a number, or times one number a column."""
     return rows * (factor if factor.is_scalar() else ca.repmat(factor, axes, 1))
 
 

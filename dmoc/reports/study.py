@@ -17,8 +17,9 @@ from dmoc.basics.files import whole_file
 from dmoc.reports.words import plain_table
 from dmoc.studies.accuracy import TARGETS, Trial, time_to_reach
 
+# Columns of the table of solves that have no value where a solve failed.
 FIGURES = ("error", "goal missed", "iterations", "calls", "build", "solve")
-# Terminals narrower than this get a table without nodes and calls.
+# Terminals narrower than this [letters] get a table without nodes and calls: with them it would not fit.
 FULL_WIDTH = 92
 
 

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from dmoc.scene.problem import TransferProblem
     from dmoc.scene.problem_file import Parameter
 
-# Width of what is written to a file or a pipe, where no terminal gives one.
+# What is written to a file or a pipe has lines of at most this many letters: no terminal gives a width there.
 PLAIN_WIDTH = 120
-# The live line is redrawn at most this often [s]: drawing must not slow the solve down.
+# The live line is drawn again after this time at the earliest [s]: drawing must not slow the solve down.
 REDRAW = 0.1
 
 
@@ -124,7 +124,7 @@ def ladder(solution: Solution) -> RenderableType:
         row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
         error = "" if level.error is None else f"{level.error:.1e}"
         table.add_row(*row, level.status, *([error] if estimated else []))
-    # on a narrow terminal headers break, not numbers
+    # on a narrow terminal the headers are broken into lines, not the numbers
     for column in table.columns:
         column.min_width = max((len(str(cell)) for cell in column.cells), default=0)
     return table
@@ -166,7 +166,8 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
     if quiet:
         return Group(head, advice)
     worst = plain_table(["worst rows of the last iterate", "violation"])
-    # found by their scaled size, in which different units compare; shown in one's own, largest first
+    # `solution.worst` is ordered by scaled size, in which rows of different units compare: units keep the order
+    # in which they come, and rows of one unit are shown largest first
     units = [unit for _, _, unit in solution.worst]
     for name, violation, unit in sorted(solution.worst, key=lambda row: (units.index(row[2]), -row[1])):
         worst.add_row(name, f"{violation:.2e} {unit}")
@@ -179,7 +180,7 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
 
     energy = trajectory.energy
     most = float(abs(energy - energy[0]).max())
-    # only where nothing does work is a change of energy the scheme's own
+    # where something does work, the energy changes; elsewhere a change is an error of the scheme
     kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
     scale = float(abs(energy).max()) if kept else 0.0
     share = f", {most / scale:.1e} of it" if scale else ""
@@ -233,6 +234,7 @@ def live_line(unit: str) -> Iterator[Callable | None]:
         yield progress
 
 
+# What is said where a tolerance was asked for and not met.
 NOT_MET = "The accuracy asked for is not met: this is the best that was found."
 
 
