@@ -46,11 +46,11 @@ from dmoc.nlp.transcription import transcribe_onto, units_of
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
-# The true optima, by indirect shooting or the controllability Gramian, to the digits shown.
+# The true optimum of each problem, to the digits that are known.
 OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
 # Methods are compared by the time they take to this relative error of the objective [-].
 TARGET = 1e-6
-# What a solve finds of those before it.
+# What is forgotten before each solve, by the name of what that solve then is like.
 STATES: dict[str, Callable[[], None]] = {
     "first": dmoc.basics.memory.forget,
     "new process": partial(dmoc.basics.memory.forget, files=True),

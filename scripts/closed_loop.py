@@ -20,9 +20,9 @@ from scipy.interpolate import CubicSpline
 from dmoc import export
 from dmoc.scene.problem_file import load_problem
 
-# Steps of a plan: enough to go around the obstacles, few enough for a plan to take milliseconds.
+# A plan has this many steps.
 STEPS = 40
-# A new plan is made after this time [s], as often as a robot learns where it is.
+# A new plan is made after this time [s].
 PERIOD = 1.0
 # The robot moves, and its force changes, in steps of this length [s].
 TICK = 0.02

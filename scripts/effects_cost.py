@@ -34,9 +34,9 @@ from dmoc.scene.problem_file import load_problem
 
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- effects -->\n).*?(?=<!-- end of effects -->)", re.DOTALL)
-# Every scene is solved at this order, at which each step has the most nodes and an effect costs most.
+# Every scene is solved at this order, at which a step has the most nodes.
 ORDER = 8
-# Steps of the mesh: enough for an accurate path of two revolutions and a half, few enough for many repetitions.
+# Steps of the mesh, for about two revolutions.
 STEPS = 100
 # Each solve is timed this often; the median counts.
 REPEATS = 9

@@ -63,7 +63,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
 def sealed(content: bytes) -> bytes:
     """A file's content with a checksum at its end.
 
-    HDF5 says in its header where it ends: other readers pass over what comes after it.
+    An HDF5 file says in its header where it ends, so other programs that read it ignore the checksum.
     """
     return content + _seal_of(content)
 

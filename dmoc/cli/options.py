@@ -57,7 +57,7 @@ Name = Annotated[
         metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
     ),
 ]
-# What a FILE on the command line is, in the help of several commands.
+# The help of several commands describes FILE with these words.
 SAVED = "A solution saved with `dmoc solve --out`"
 File = Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}.")]
 Source = Annotated[

@@ -113,6 +113,7 @@ def _tables(runs: list, rounding: list, edges: list) -> list[RenderableType]:
     for row in edges:
         low, high, most = row.gaps[0]
         until = f"{most:.4g} (until {high:.3f})" if high < row.reach[-1] else f"{most:.4g}"
+        # a growth below 1 is amplitude lost; at h omega = 1 a step is a sixth of an oscillation
         lost = 1 - float(row.growth[row.reach.searchsorted(1.0)])
         table.add_row(row.method, f"{low:.3f}", until, f"{lost:.1e}" if lost > 1e-12 else "nothing")
     return [*parts, table]

@@ -69,7 +69,7 @@ int main(void) {{
   for (int i = 0; i < DMOC_CONTROLS * DMOC_FORCES; ++i) forces[i] = push[i % DMOC_CONTROLS];
   if (rollout(start, found, iw, w, 0) || residual(path, rows, iw, w, 0)) return 1;
   for (int i = 0; i < DMOC_AXES * DMOC_NODES; ++i) worst = fmax(worst, fabs(defects[i]));
-  printf("position after %g s [m]:", duration);
+  printf("position after %g s [m]:", duration[0]);
   for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", positions[DMOC_AXES * (DMOC_NODES - 1) + i]);
   printf("\\nvelocity [m/s]:");
   for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", velocities[DMOC_AXES * DMOC_STEPS + i]);
@@ -148,7 +148,7 @@ def _example(planner: Planner, rollout: ca.Function, residual: ca.Function) -> s
         start=", ".join(rollout.name_in()),
         path=", ".join(arrays.get(name, name) for name in residual.name_in()),
         found=", ".join(rollout.name_out()),
-    ).replace('[m]:", duration)', '[m]:", duration[0])')
+    )
 
 
 def _c_values(values: Any) -> str:

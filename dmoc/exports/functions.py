@@ -158,9 +158,9 @@ def number_terms(names: Iterable[str]) -> dict[str, Term]:
 def march(scene: Scene) -> ca.Function:
     """One step of (displacement from origin, momentum per mass, mass, number of the step).
 
-    (state, controls stacked, what stays the same) -> next state, displacements and masses of nodes
-    1 .. s of the step, velocity at its end. What stays the same is one column, start_time, h, origin and
-    the numbers of the flow: a column is repeated in C without a table as long as there are steps.
+    (state, controls stacked, constants) -> next state, displacements and masses of nodes 1 .. s of the step,
+    velocity at its end. The constants, start_time, h, origin and the numbers of the flow, are one column: it
+    is the same for all steps, and generated C code then needs no table with a copy of it for every step.
     """
     n, rule, columns = scene.axes, scene.rule, scene.step_columns
     state, stacked = ca.MX.sym("state", 2 * n + 2), ca.MX.sym("u", scene.controls * columns)

@@ -19,8 +19,8 @@ from dmoc.scene.problem import TransferProblem
 
 # How a bound or parameter depends on a number is found by evaluating it at this value [in the number's SI
 # unit]: bounds and parameters are NumPy arrays, of which CasADi has no derivative. If b(x) = c + a x, then
-# b(2^100) is a 2^100 alone: next to a number so large, c is lost in rounding. Dividing by a power of two changes
-# no digit, so a is exact, whereas a difference of two values near each other would lose half of its digits.
+# b(2^100) is a 2^100 alone: next to a number so large, c is lost in rounding. Dividing by a power of two
+# changes no digit, so a is exact, while a difference of two values near each other would lose half of them.
 HUGE = 2.0**100
 # The slopes found at plus and minus `HUGE` may differ by this relative error [-]; more means not affine.
 AFFINE = 1e-12

@@ -56,7 +56,7 @@ class Planner:
 
     @property
     def plan_names(self) -> list[str]:
-        """What a plan consists of, beside multipliers."""
+        """The arguments that make up a plan, without its multipliers."""
         more = ["masses"] * self.scene.burns + ["duration"] * self.scene.problem.free_duration
         return ["positions", "velocities", "forces", *more]
 
@@ -141,7 +141,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
 
 
 def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX]) -> dict[str, ca.MX]:
-    """What a solve gave, in SI units; the residual is found anew from the path."""
+    """The plan that a solve gave, in SI units; its residual is computed from the plan, not taken from Ipopt."""
     path = planner.unpack(found["x"], numbers)
     path["velocities"] = velocities_of(planner.scene, path)
     residual = residual_of(planner.scene, path)

@@ -11,6 +11,7 @@ from dmoc.motion.momenta import legendre_function
 
 def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
     """P_0 .. P_s [m/s] of every step of a path, one column a step."""
+    # positions relative to the first one: far from the origin, their differences would lose digits
     h, origin = path["duration"] / scene.steps, path["positions"][:, 0]
     q = ca.vertcat(*scene.at_nodes(path["positions"] - ca.repmat(origin, 1, scene.nodes)))
     m = ca.vertcat(*scene.at_nodes(path["masses"])) if scene.burns else ca.MX(0, scene.steps)
@@ -20,7 +21,10 @@ def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
 
 
 def step_times(steps: int) -> ca.Function:
-    """(0, start time, h) -> times at the start of all steps, counted and not added up."""
+    """(0, start time, h) -> times at the start of all steps.
+
+    Each is start time + count h: added up step by step, the times would collect rounding errors.
+    """
     state = ca.MX.sym("state", 3)
     given = ca.vertcat(state[0] + 1, state[1:])
     return ca.Function("count", [state], [given, state[1] + state[0] * state[2]]).mapaccum("times", steps)

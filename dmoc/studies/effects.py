@@ -162,6 +162,7 @@ def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: 
     n = problem.dimension
     t, q, v, m = state_symbols(n)
     still = ca.DM.zeros(n)
+    # the acceleration of a scene with this effect only, without a force of the actuator
     alone = Dynamics(n, (effect,), problem.actuator).acceleration(t, q, v, m, still)
     function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
     ends = slice(None, None, scheme(path.order).degree)

@@ -17,7 +17,7 @@ from dmoc.sweeps.plan import Plan
 if TYPE_CHECKING:
     from xarray import Dataset
 
-# The name and version by which a file of this kind is known, and what is told where a file is none.
+# The name and version by which a file of this kind is known, its description, and the remedy where it is none.
 SWEEP_FILE = Format("dmoc sweep", 2, "the result of a sweep", "sweeps are written by dmoc sweep")
 
 

@@ -180,7 +180,7 @@ class SchedulerPool:
         try:
             return 2 * max(1, sum(self.client.nthreads().values()))
         except OSError:
-            # the scheduler does not answer: what is submitted next will say so
+            # the scheduler does not answer: the future of the next point will say so
             return 1
 
 
