@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from dmoc.exports.export import export as export
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate
-    from dmoc.nlp.program import NLP as NLP
+    from dmoc.nlp.solving import NLP as NLP
     from dmoc.nlp.transcription import transcribe as transcribe
     from dmoc.parts.actuator import Actuator as Actuator
     from dmoc.parts.constraint import Constraint as Constraint

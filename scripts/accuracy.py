@@ -32,14 +32,17 @@ README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- accuracy -->\n).*?(?=<!-- end of accuracy -->)", re.DOTALL)
 HEAD = "| problem | how | " + " | ".join(f"{target:.0e}" for target in TARGETS) + " |\n"
 HEAD += "|---" * (2 + len(TARGETS)) + "|\n"
+# Each solve is timed this often; the median counts.
 REPEATS = 3
+# Steps at each order, from coarse meshes to such as reach the last of TARGETS.
 MESHES = {
     "order 2": (25, 100, 400, 1600, 6400, 25600),
     "order 4": (10, 25, 50, 100, 200, 400, 800),
     "order 6": (6, 12, 24, 48, 96, 192),
     "order 8": (4, 8, 12, 16, 24, 32, 64, 128),
 }
-# Where controls switch, many iterations on each mesh, and accuracy that does not grow with the order.
+# Where controls switch, a mesh takes many iterations and high orders are no more accurate: fewer meshes, and
+# orders 2 and 4 alone.
 SWITCHING = {"order 2": (50, 200, 800, 3200), "order 4": (25, 100, 400, 1600)}
 OTHERS = METHODS | {f"Radau {d}": partial(radau, degree=d) for d in (3, 5, 7)}
 OTHERS.pop("plain")
@@ -48,7 +51,8 @@ OTHER_MESHES = {
     for name in OTHERS
 } | {f"Radau {d}": (4, 8, 16, 32, 64) for d in (5, 7)}
 OTHER_MESHES["Radau 3"] = (8, 16, 32, 64, 128, 256)
-# By problem: meshes of the orders, of the methods written by hand, and the tightest tolerance to ask for.
+# By problem: the meshes of the orders, those of the methods written by hand, and the tightest relative error
+# that `--tol` is asked for [-].
 PROBLEMS = {
     "orbit_raise": (MESHES, OTHER_MESHES, 1e-9),
     "rendezvous": (MESHES, OTHER_MESHES, 1e-9),

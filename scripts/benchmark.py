@@ -43,7 +43,9 @@ from dmoc.nlp.units import units_of
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
+# The true optimum of each problem, to the digits that are known.
 OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
+# Methods are compared by the time they take to this relative error of the objective [-].
 TARGET = 1e-6
 # Whether the same process has solved the scene before.
 STATES = {"first": False, "same process": True}
@@ -51,7 +53,7 @@ ORDERS = {"order 2": 2, "order 4": 4, "order 6": 6, "order 8": 8}
 OTHERS = METHODS | {f"Radau {d}": partial(radau, degree=d) for d in (2, 3, 4, 5, 7)}
 ORDERS |= {"plain": 2, "trapezoid": 2, "RK4 shooting, held": 2, "RK4 shooting": 4, "Hermite-Simpson": 4}
 ORDERS |= {f"Radau {d}": 2 * d - 1 for d in (2, 3, 4, 5, 7)}
-# Steps of a first solve at each order, from whose error the number of steps for TARGET follows.
+# By order, steps of a first solve; the number of steps for TARGET follows from its error and the order.
 PILOT = {2: 800, 3: 100, 4: 60, 5: 30, 6: 16, 7: 12, 8: 10, 9: 8, 13: 5}
 
 

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from dmoc.reports.words import plain_table
+
 console = Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else 130)
 
 
@@ -87,10 +89,7 @@ def show_verdicts(rows: list[tuple[str, float, dict[str, float]]]) -> None:
 
 
 def _table(*columns: str) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i else "left")
-    return table
+    return plain_table(columns, numbers=slice(1, None), unbroken=slice(0))
 
 
 def milliseconds(seconds: float | None) -> str:

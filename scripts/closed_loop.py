@@ -20,11 +20,20 @@ from scipy.interpolate import CubicSpline
 from dmoc import export
 from dmoc.scene.problem_file import load_problem
 
-STEPS, PERIOD, TICK = 40, 1.0, 0.02
-LAST_PLAN = 2.0  # no new plan when less time than this is left [s]
-MASS_ERROR = 1.08  # true mass over the one the planner believes
-MARGIN = 0.05  # added to the obstacles' radius: plans keep clear of them at nodes only [m]
-GOOD = {"largest_residual": 1e-6, "violation": 1e-6}  # of a plan to be flown [N], [-]
+# A plan has this many steps.
+STEPS = 40
+# A new plan is made after this time [s].
+PERIOD = 1.0
+# The robot moves, and its force changes, in steps of this length [s].
+TICK = 0.02
+# No new plan is made when less time than this is left [s]: what is off by then cannot be made good any more.
+LAST_PLAN = 2.0
+# The robot is heavier than the planner believes, by this factor [-].
+MASS_ERROR = 1.08
+# The planner takes obstacles to be larger by this [m], since a plan keeps clear of them at its nodes only.
+MARGIN = 0.05
+# A plan is flown if its largest residual [N] and its violation of limits [-] are no larger than this.
+GOOD = {"largest_residual": 1e-6, "violation": 1e-6}
 
 
 def push_at(t: float, noise: np.random.Generator) -> np.ndarray:
@@ -40,7 +49,8 @@ def moved_on(plan: dict, left: float, gone: float) -> dict:
     for name, values in guess.items():
         if (old := places.get(values.shape[1])) is not None:
             new = (gone + old * (left - gone)) / left
-            # positions must stay smooth, their second differences are forces; multipliers must not overshoot
+            # positions are joined by a cubic, for their second differences are forces; multipliers of limits by
+            # straight lines, for a cubic would overshoot and change their sign
             smooth = name in ("guess_positions", "guess_velocities", "guess_multipliers_dynamics")
             linear = np.stack([np.interp(new, old, row) for row in values])
             guess[name] = CubicSpline(old, values.T)(new).T if smooth else linear

@@ -34,7 +34,13 @@ from dmoc.scene.problem_file import load_problem
 
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- effects -->\n).*?(?=<!-- end of effects -->)", re.DOTALL)
-ORDER, STEPS, REPEATS = 8, 100, 9
+# Every scene is solved at this order, at which a step has the most nodes.
+ORDER = 8
+# Steps of the mesh, for about two revolutions.
+STEPS = 100
+# Each solve is timed this often; the median counts.
+REPEATS = 9
+# Columns of the table, and the CasADi functions whose instructions each adds up.
 FUNCTIONS = {"function": ("rows", "cost"), "Jacobian": ("jacobian", "gradient"), "Hessian": ("hessian",)}
 HEAD = "| effects | function | Jacobian | Hessian | iterations | build [ms] | solve [ms] |\n"
 HEAD += "|---|---|---|---|---|---|---|\n"
@@ -76,14 +82,14 @@ def instructions(problem: TransferProblem, order: int) -> dict[str, int]:
 
 def rows() -> list[str]:
     """Lines of the table; seconds are medians of runs in which the scenes take turns."""
-    cases, found = scenes(), {}
+    problems, found = scenes(), {}
     for _ in range(REPEATS):
-        for name, problem in cases.items():
+        for name, problem in problems.items():
             forget()
             found.setdefault(name, []).append(solve(problem, order=ORDER, steps=STEPS).raise_for_status())
     lines = []
     for name, runs in found.items():
-        counts = "".join(f" {count} |" for count in instructions(cases[name], ORDER).values())
+        counts = "".join(f" {count} |" for count in instructions(problems[name], ORDER).values())
         build, run = (1e3 * median(getattr(each, part) for each in runs) for part in ("build_s", "solve_s"))
         lines.append(f"| {name} |{counts} {runs[0].iterations} | {build:.0f} | {run:.0f} |\n")
     return lines

@@ -19,7 +19,7 @@ from dmoc.basics.docstrings import first_line
 from dmoc.plots.page import save_figure
 from dmoc.plots.stability import stability_figure
 from dmoc.plots.study import save_page
-from dmoc.plots.sweep import figure
+from dmoc.plots.sweep import sweep_figure
 from dmoc.results.solution import Solution
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.drift import drift, kepler, per_revolution
@@ -27,9 +27,15 @@ from dmoc.studies.rounding import growth, round_off
 
 PROBLEMS = Path(__file__).parents[1] / "problems"
 GALLERY = PROBLEMS / "gallery"
-DPI = 90  # 1200 pixels wide
+# Dots an inch: at 13.33 inches a picture is 1200 pixels wide, as wide as a page shows it.
+DPI = 90
+# A picture of more bytes than this is stored with a palette of 256 colours.
 LARGEST = 250_000
-LONG_RUNS, SWEEP = "stability", "sweep"
+# The argument that stands for the long runs, and the name of their picture.
+LONG_RUNS = "stability"
+# The argument that stands for the sweep, and the name of its picture.
+SWEEP = "sweep"
+# What is varied in the sweep: duration [s] and angle [rad] of orbit_raise, 525 points.
 VARIED = {"duration": "5:17:25", "angle": "4:14:21"}
 
 
@@ -62,7 +68,7 @@ def draw_sweep() -> None:
     """What the README's sweep of `orbit_raise` over 525 points draws."""
     with TemporaryDirectory() as work:
         data = sweep("orbit_raise", VARIED, Path(work) / "map.nc", order=8, steps=25)
-    save_page(figure(data), GALLERY / f"{SWEEP}.png", DPI)
+    save_page(sweep_figure(data), GALLERY / f"{SWEEP}.png", DPI)
     reduce_colors(GALLERY / f"{SWEEP}.png")
 
 

@@ -8,10 +8,17 @@ from typing import Any
 
 import numpy as np
 
-# Beyond these sizes [SI] squares and products overflow or vanish; nothing that moves comes near them.
-LARGEST, SMALLEST = 1e50, 1e-50
-# More steps would not fit into memory.
-MOST = 10_000_000
+from dmoc.basics.plain import unbroken
+
+# A number may be this large [in its SI unit]: products of six of them still stay below 1e308, where floating
+# point overflows, and nothing that moves comes near it.
+LARGEST = 1e50
+# A smaller number [in its SI unit] counts as 0, or is refused where 0 is: its products would underflow to 0.
+SMALLEST = 1e-50
+# A count of steps or repetitions may be this large: the path of more steps would not fit into memory.
+MOST_COUNTED = 10_000_000
+# Longer values are cut off in a message, which should fit on one line of a terminal [letters].
+SHORT = 60
 
 # What a part takes for a vector; it holds the tuple that `vector` makes of it. None stands for what is free.
 Vector = Sequence[float] | np.ndarray
@@ -23,7 +30,8 @@ def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative
     try:
         result = math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
         several = np.ndim(value) > 0 if isinstance(value, np.ndarray) else False
-    except Exception:  # whatever a user's object raises
+    except Exception:
+        # the conversion of a user's own object may raise anything
         several = True
     if several:
         raise ValueError(f"{name} must be one number{_in(unit)}; got {short(value)}") from None
@@ -62,7 +70,7 @@ def limits(name: str, value: Any, unit: str) -> float | tuple:
 
 
 def entries(value: Any) -> tuple | None:
-    """What a list, tuple, range or array holds; None of anything else."""
+    """The entries of a list, tuple, range or array; None for anything else."""
     if isinstance(value, np.ndarray):
         return tuple(value) if value.ndim else None
     return tuple(value) if isinstance(value, (list, tuple, range)) else None
@@ -72,8 +80,8 @@ def whole(name: str, value: Any, least: int = 1) -> int:
     """`value` as a whole number of at least `least` that a computer can count to, or a ValueError."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
         raise ValueError(f"{name} must be a whole number of at least {least}; got {short(value)}")
-    if value > MOST:
-        raise ValueError(f"{name} must be at most {MOST:,}; got {short(value)}")
+    if value > MOST_COUNTED:
+        raise ValueError(f"{name} must be at most {MOST_COUNTED:,}; got {short(value)}")
     return int(value)
 
 
@@ -100,16 +108,32 @@ def same_length(owner: str, **vectors) -> None:
         raise ValueError(f"{owner}: {listing}; give all of them the same number of entries")
 
 
-def _in(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
+def matching_length(part: Any, argument: str, given: int, dimension: int) -> None:
+    """ValueError unless an argument of a part has as many entries as the problem has dimensions."""
+    if given != dimension:
+        raise ValueError(
+            f"{type(part).__name__}: {argument} has {given} entries but the problem has {dimension} "
+            f"dimensions; give {dimension} entries"
+        )
+
+
+def checked(part: Any, **values: Any) -> None:
+    """Set fields of a frozen dataclass from its `__post_init__`: the values given, after they were checked."""
+    for name, value in values.items():
+        # a frozen dataclass refuses an assignment, from its own methods too
+        object.__setattr__(part, name, value)
 
 
 def short(value: Any) -> str:
     """`value` as it is written, on one line that is not too long."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    text = unbroken(repr(value))
+    return text if len(text) <= SHORT else text[: SHORT - 3] + "..."
 
 
 def times_each(value: float | Vector, factor: float) -> float | tuple[float, ...]:
     """A number, or each of several, so many times as large."""
     return factor * value if isinstance(value, (int, float)) else tuple(factor * float(each) for each in value)
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""

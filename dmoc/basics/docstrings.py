@@ -6,9 +6,11 @@ import inspect
 import re
 from dataclasses import dataclass
 
-# A heading is underlined; an entry stands at the margin, `name, other : type [unit]`.
+# The heading of a section is a line at the margin that is underlined.
 _HEADING = re.compile(r"^(\S.*)\n-{3,}\n", re.MULTILINE)
+# An entry is a line at the margin, `name, other : type [unit]`; its description is indented below it.
 _ENTRY = re.compile(r"^(\w+(?:, *\w+)*) *(?:: *(.*))?$")
+# A unit stands in square brackets.
 _UNIT = re.compile(r"\[([^\]]*)\]")
 
 

@@ -11,15 +11,16 @@ from pathlib import Path
 
 from dmoc.basics.arguments import short
 
-# Letters of a name; a temporary file beside it has a few more.
+# A file name has at most this many letters: most systems allow 255, and the temporary file has a few more.
 LONGEST = 200
-# What stands before the checksum at the end of a sealed file.
+# A sealed file ends with these bytes, then the checksum of all before them.
 SEAL = b"\ndmoc sha256 "
+# The remedy that is told where a file is damaged.
 AGAIN = "copy it or write it again"
 
 
-def path_of(path: str | os.PathLike) -> Path:
-    """A path, or a ValueError if it is none."""
+def as_path(path: str | os.PathLike) -> Path:
+    """A path, or a ValueError if it is none or its name is too long."""
     if not isinstance(path, (str, os.PathLike)):
         raise ValueError(f"a file is named by a text or a path; got {short(path)}")
     if len(Path(path).name) > LONGEST:
@@ -41,7 +42,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     OSError
         If the disk is full, say.
     """
-    target = path_of(path)
+    target = as_path(path)
     if not target.parent.is_dir():
         raise ValueError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
     if target.exists() and not target.is_file():
@@ -50,7 +51,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     try:
         yield temporary
         with open(temporary, "rb+") as written:
-            # the name must not reach the disk before the contents
+            # after a power cut there must be no file of that name without its contents
             os.fsync(written.fileno())
         os.replace(temporary, target)
     except OSError as error:
@@ -62,13 +63,13 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
 def sealed(content: bytes) -> bytes:
     """A file's content with a checksum at its end.
 
-    HDF5 says in its header where it ends: other readers pass over what comes after it.
+    An HDF5 file says in its header where it ends, so other programs that read it ignore the checksum.
     """
     return content + _seal_of(content)
 
 
 def is_sealed(path: Path) -> bool:
-    """Whether a file has a checksum, which holds: to be asked before a library that trusts it opens it.
+    """Whether a file has a checksum that holds; ask before a library that trusts its files opens it.
 
     Raises
     ------
@@ -78,7 +79,8 @@ def is_sealed(path: Path) -> bool:
     whole = path.read_bytes()
     length = len(_seal_of(b""))
     found, wanted = whole[-length:], _seal_of(whole[:-length])
-    # a changed byte in the words before the checksum must not make it a file that never had one
+    # a file that never had a checksum may be read. One whose seal is damaged too must not pass for such a file:
+    # where most bytes before the checksum are those of the seal, it had one
     if found != wanted and sum(a == b for a, b in zip(found, SEAL, strict=False)) > len(SEAL) / 2:
         raise ValueError(f"{path} is damaged: its checksum does not hold; {AGAIN}")
     return found == wanted

@@ -15,16 +15,45 @@ from collections.abc import Callable, Hashable
 from functools import cached_property, partial
 from itertools import chain
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+# This many functions are remembered; the ones used longest ago go first.
 MOST = 500
 # A table of more rows is long: a key holds its digest, not all of it.
 MOST_ROWS = 100
 
 T = TypeVar("T")
-_known: OrderedDict[Hashable, Any] = OrderedDict()
+
+
+class Shelf:
+    """At most so many things by their keys; the ones used longest ago make room for new ones."""
+
+    _all: ClassVar[list[Shelf]] = []
+
+    def __init__(self, most: int):
+        self.most = most
+        self._held: OrderedDict[Hashable, Any] = OrderedDict()
+        self._all.append(self)
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What stands there, or else what `make` gives, which then stands there."""
+        # An entry that is taken out and put in again stands last, also where another thread did the same.
+        found = self._held.pop(key, None)
+        self._held[key] = found = make() if found is None else found
+        while len(self._held) > self.most:
+            self._held.popitem(last=False)
+        return found
+
+    @classmethod
+    def clear_all(cls) -> None:
+        """Empty every shelf."""
+        for shelf in cls._all:
+            shelf._held.clear()
+
+
+_functions = Shelf(MOST)
 
 
 def remembered(make: Callable[[], T], *key: Any) -> T:
@@ -33,12 +62,7 @@ def remembered(make: Callable[[], T], *key: Any) -> T:
         name = identity(key)
     except TypeError:
         return make()
-    # out and in again: those used last stand last, whatever other threads do meanwhile
-    found = _known.pop(name, None)
-    _known[name] = found = make() if found is None else found
-    while len(_known) > MOST:
-        _known.popitem(last=False)
-    return found
+    return _functions.get(name, make)
 
 
 class remembered_property(cached_property):  # noqa: N801 - used as a decorator
@@ -51,7 +75,7 @@ class remembered_property(cached_property):  # noqa: N801 - used as a decorator
 
 def forget() -> None:
     """Start as a new process does, for one that measures."""
-    _known.clear()
+    Shelf.clear_all()
 
 
 def identity(value: Any) -> Hashable:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 # A coupling of two unknowns below this share of them changes no digit.
-NEGLIGIBLE = 1e-17
+UNCOUPLED = 1e-17
 
 
 def cubic_spline(x: np.ndarray, y: np.ndarray, slopes: tuple | None = None) -> Callable:
@@ -73,7 +73,7 @@ def _tridiagonal(below: np.ndarray, above: np.ndarray, right: np.ndarray) -> np.
     (R. W. Hockney, C. R. Jesshope, Parallel Computers (1981), section 5.4.)
     """
     reach = 1
-    while reach < len(below) and max(below.max(), above.max(), -below.min(), -above.min()) > NEGLIGIBLE:
+    while reach < len(below) and max(below.max(), above.max(), -below.min(), -above.min()) > UNCOUPLED:
         lower, upper = below[reach:], above[:-reach]
         pivot, known = np.ones_like(below), right.copy()
         pivot[reach:] -= lower * upper

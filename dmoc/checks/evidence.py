@@ -19,7 +19,7 @@ from dmoc.scene.problem import TransferProblem
 ROUNDING = 10 * np.finfo(float).eps
 
 
-class Case:
+class Evidence:
     """The numbers of one solution: momenta, velocities, forces, and the scales they are judged by."""
 
     def __init__(self, solution: Solution):

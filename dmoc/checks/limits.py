@@ -9,14 +9,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.checks.evidence import Case
+from dmoc.checks.evidence import Evidence
 from dmoc.motion.dynamics import state_symbols
 
 # What the optimiser may leave of a limit, what round-off may leave of an entry that is simply fixed,
 # and how deep a path may cut into a zone between nodes however coarse its mesh.
-BOUND, EXACT, DEEPEST = 1e-6, 1e-9, 1e-2
+BOUND, FIXED, DEEPEST = 1e-6, 1e-9, 1e-2
 # Into how many parts a gap between two nodes is divided, at least, and how many that may be in all.
-FEWEST, MOST_SAMPLES = 8, 1_000_000
+FEWEST, MOST_PLACES = 8, 1_000_000
 
 
 @dataclass(frozen=True)
@@ -38,45 +38,53 @@ class Excess:
         return float(np.nan_to_num(self.value / self.allowed, nan=np.inf))
 
 
-def excesses(case: Case) -> list[Excess]:
+def excesses(evidence: Evidence) -> list[Excess]:
     """Every limit of the problem, as the path keeps it."""
-    return [*_controls(case), *_duration(case), *_boundary(case), *_zones(case)]
+    return [*_controls(evidence), *_duration_excess(evidence), *_boundary(evidence), *_zone_excess(evidence)]
 
 
-def _controls(case: Case) -> Iterable[Excess]:
+def _controls(evidence: Evidence) -> Iterable[Excess]:
     """Limits of the actuator, at the nodes or, with hold, in the steps."""
-    actuator, control = case.problem.actuator, case.path.control
-    scale = actuator.force_limit() or case.largest or 1.0
+    actuator, control = evidence.problem.actuator, evidence.path.control
+    scale = actuator.force_limit() or evidence.largest or 1.0
     yield Excess("force", _most(actuator.excess(control)), BOUND * scale, "N")
     u = ca.SX.sym("u", control.shape[1])
-    yield from _rows("actuator", actuator.rows(u), [u], [control.T])
+    yield from _row_excess("actuator", actuator.rows(u), [u], [control.T])
     if actuator.dry_mass > 0:
-        missing = _most(actuator.dry_mass - case.mass)
-        yield Excess("dry mass", missing, BOUND * case.problem.mass, "kg")
+        missing = _most(actuator.dry_mass - evidence.mass)
+        yield Excess("dry mass", missing, BOUND * evidence.problem.mass, "kg")
 
 
-def _duration(case: Case) -> Iterable[Excess]:
-    shortest, longest = case.problem.duration_bounds
-    beyond = _most(np.array([shortest - case.path.duration, case.path.duration - longest]))
+def _duration_excess(evidence: Evidence) -> Iterable[Excess]:
+    shortest, longest = evidence.problem.duration_bounds
+    beyond = _most(np.array([shortest - evidence.path.duration, evidence.path.duration - longest]))
     yield Excess("duration", beyond, BOUND * longest, "s")
 
 
-def _boundary(case: Case) -> Iterable[Excess]:
+def _boundary(evidence: Evidence) -> Iterable[Excess]:
     """Entries that are fixed must be met to round-off, conditions to the optimiser's tolerance."""
-    problem, path = case.problem, case.path
+    problem, path = evidence.problem, evidence.path
     t, q, v, m = state_symbols(problem.dimension)
     for name, place, velocity in (("start", 0, path.start_velocity), ("goal", -1, path.goal_velocity)):
         end = getattr(problem, name)
         for kind, wanted, have, allowed, unit in (
-            ("position", end.fixed()[0], case.position[place], EXACT * case.extent + case.rounding, "m"),
-            ("velocity", end.fixed()[1], velocity, EXACT * case.speed, "m/s"),
+            (
+                "position",
+                end.fixed()[0],
+                evidence.position[place],
+                FIXED * evidence.extent + evidence.rounding,
+                "m",
+            ),
+            ("velocity", end.fixed()[1], velocity, FIXED * evidence.speed, "m/s"),
         ):
             yield Excess(f"{name} {kind}", _most(np.abs(have - wanted)[~np.isnan(wanted)]), allowed, unit)
-        state = [case.time[place], case.position[place], velocity, case.mass[place]]
-        yield from _rows(name, end.rows(t, q, v, m), [t, q, v, m], state, {"m": case.extent, "m/s": case.speed})
+        state = [evidence.time[place], evidence.position[place], velocity, evidence.mass[place]]
+        yield from _row_excess(
+            name, end.rows(t, q, v, m), [t, q, v, m], state, {"m": evidence.extent, "m/s": evidence.speed}
+        )
 
 
-def _rows(
+def _row_excess(
     owner: str, rows: list, symbols: list, values: list, sizes: dict[str, float] | None = None
 ) -> Iterable[Excess]:
     """Rows as a part of the problem states them, in their own unit."""
@@ -88,7 +96,7 @@ def _rows(
         yield Excess(f"{owner} {row.name}", beyond, allowed, unit or "-")
 
 
-def _zones(case: Case) -> Iterable[Excess]:
+def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     """Zones at the nodes and between them; a speed limit everywhere.
 
     Rows act at nodes alone, so between two of them a path may cut into a zone: by what the chord
@@ -97,38 +105,38 @@ def _zones(case: Case) -> Iterable[Excess]:
     the nodes differ by half of what they are off the line between their neighbours. All of this is of
     order h^2, and none of it excuses more than a hundredth.
     """
-    if not case.problem.constraints:
+    if not evidence.problem.constraints:
         return
-    longest = float(np.linalg.norm(np.diff(case.position, axis=0), axis=1).max())
-    path, chord, velocity, straight = _between(case, longest)
+    longest = float(np.linalg.norm(np.diff(evidence.position, axis=0), axis=1).max())
+    path, chord, velocity, straight = _inside_gaps(evidence, longest)
     bend = _most(np.linalg.norm(path - chord, axis=1))
-    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(case)
+    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(evidence)
     still = np.zeros_like(path)
-    for i, constraint in enumerate(case.problem.constraints):
+    for i, constraint in enumerate(evidence.problem.constraints):
         name = f"{type(constraint).__name__} {i + 1}"
         if constraint.limits_speed:
-            allowed = BOUND * case.speed + min(sway, DEEPEST * case.speed)
+            allowed = BOUND * evidence.speed + min(sway, DEEPEST * evidence.speed)
             yield Excess(name, _most(constraint.excess(path, velocity)), allowed, "m/s")
             continue
-        at_nodes = _most(constraint.excess(case.position, case.node_velocity))
-        yield Excess(f"{name} at nodes", at_nodes, BOUND * case.extent, constraint.unit)
+        at_nodes = _most(constraint.excess(evidence.position, evidence.node_velocity))
+        yield Excess(f"{name} at nodes", at_nodes, BOUND * evidence.extent, constraint.unit)
         size = constraint.feature()
         cut = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
-        cut = min(cut + bend, DEEPEST * min(size, case.extent))
+        cut = min(cut + bend, DEEPEST * min(size, evidence.extent))
         between = _most(constraint.excess(path, still))
-        yield Excess(f"{name} between nodes", between, BOUND * case.extent + cut, constraint.unit)
+        yield Excess(f"{name} between nodes", between, BOUND * evidence.extent + cut, constraint.unit)
 
 
-def _between(case: Case, longest: float) -> tuple[np.ndarray, ...]:
+def _inside_gaps(evidence: Evidence, longest: float) -> tuple[np.ndarray, ...]:
     """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
 
     The path is the cubic that has the positions and velocities of both nodes; it is looked at often
     enough not to step over a zone that is smaller than the longest gap [m].
     """
-    q, v = case.position, case.node_velocity
-    tau = case.path.duration * np.diff(case.path.fractions)[:, None, None]
-    smallest = min(constraint.feature() for constraint in case.problem.constraints)
-    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_SAMPLES // len(q))))
+    q, v = evidence.position, evidence.node_velocity
+    tau = evidence.path.duration * np.diff(evidence.path.fractions)[:, None, None]
+    smallest = min(constraint.feature() for constraint in evidence.problem.constraints)
+    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
     mean = np.diff(q, axis=0)[:, None] / tau
     first, second = v[:-1, None] - mean, v[1:, None] - mean
@@ -140,9 +148,9 @@ def _between(case: Case, longest: float) -> tuple[np.ndarray, ...]:
     return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
 
 
-def _bump(case: Case) -> float:
+def _bump(evidence: Evidence) -> float:
     """How far the velocity at a node is at most off the line between its neighbours in time [m/s]."""
-    time, velocity = case.path.fractions, case.node_velocity
+    time, velocity = evidence.path.fractions, evidence.node_velocity
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
     line = (1 - share) * velocity[:-2] + share * velocity[2:]
     return _most(np.linalg.norm(velocity[1:-1] - line, axis=1))

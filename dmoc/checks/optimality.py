@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.checks.evidence import Case
+from dmoc.checks.evidence import Evidence
 from dmoc.motion.mesh import node_weights
 from dmoc.nlp.placement import Placement
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import units_of
 
@@ -43,15 +43,15 @@ class Stationarity:
         return float(np.max([self.force, self.path, self.limits, self.objective]))
 
 
-def stationarity(case: Case) -> Stationarity:
+def stationarity(evidence: Evidence) -> Stationarity:
     """First-order conditions at a solution, from its multipliers.
 
     Evaluated block by block, without the sparse derivatives that a solve needs.
     """
-    nlp, blocks = _unassembled(case)
-    lam_x, lam_g = nlp.multipliers(case.path)
-    x, p = nlp.pack(case.path), nlp.parameters(case.problem)
-    lbx, ubx, lbg, ubg = nlp.bounds(case.problem)
+    nlp, blocks = _unassembled(evidence)
+    lam_x, lam_g = nlp.multipliers(evidence.path)
+    x, p = nlp.pack(evidence.path), nlp.parameters(evidence.problem)
+    lbx, ubx, lbg, ubg = nlp.bounds(evidence.problem)
     slope, rows, cost = _evaluate(blocks, nlp, x, p, lam_g)
     slope = slope + lam_x
     weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
@@ -65,7 +65,7 @@ def stationarity(case: Case) -> Stationarity:
             (nlp.rows, lam_g, rows, lbg, ubg),
         )
     ]
-    stated = case.solution.objective * case.problem.objective.sense / nlp.units.cost
+    stated = evidence.solution.objective * evidence.problem.objective.sense / nlp.units.cost
     return Stationarity(
         float(np.abs(force.of(slope) / weights["control"][:, None]).max(initial=0.0)),
         float(np.max([np.abs(np.cumsum(part, axis=0)).max(initial=0.0) for part in along])),
@@ -74,24 +74,24 @@ def stationarity(case: Case) -> Stationarity:
     )
 
 
-def _unassembled(case: Case) -> tuple[NLP, list]:
+def _unassembled(evidence: Evidence) -> tuple[NLP, list]:
     """The NLP of a path without its sparse derivatives, and its blocks.
 
     Its units are those of a body that is pushed at least as hard as it takes to cross the path in the
     duration: where hardly any force is needed there is nothing to be measured relative to it.
     """
-    problem, path = case.problem, case.path
-    if case.largest < case.typical_force:
-        path = replace(path, control=np.full_like(path.control, case.typical_force))
+    problem, path = evidence.problem, evidence.path
+    if evidence.largest < evidence.typical_force:
+        path = replace(path, control=np.full_like(path.control, evidence.typical_force))
     units = units_of(problem, path)
     script = Placement(
-        problem, stencils_of(problem, path.order, path.hold), case.rule, path.hold, path.mesh, units
+        problem, stencils_of(problem, path.order, path.hold), evidence.rule, path.hold, path.mesh, units
     )
     derivatives: Any = None
     nlp = NLP(
         problem,
-        case.dynamics,
-        case.rule,
+        evidence.dynamics,
+        evidence.rule,
         path.hold,
         path.mesh,
         units,

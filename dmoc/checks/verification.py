@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.checks.evidence import ROUNDING, Case
+from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
 from dmoc.motion.dynamics import specific_lagrangian, state_symbols
@@ -89,12 +89,12 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
         solution = solution.attach(problem)
     begun = time.perf_counter()
     with np.errstate(all="ignore"):
-        case = Case(solution)
-        undefined = case.undefined()
+        evidence = Evidence(solution)
+        undefined = evidence.undefined()
         checks = tuple(
             Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
             if undefined
-            else check(case)
+            else check(evidence)
             for name, check in CHECKS.items()
         )
     return Report(checks, time.perf_counter() - begun)
@@ -105,39 +105,46 @@ def _check(name: str, value: float, limit: float, unit: str, note: str) -> Check
     return Check(name, float(value), float(limit), unit, bool(value <= limit), note)
 
 
-def _residual(case: Case) -> Check:
+def _residual(evidence: Evidence) -> Check:
     """Row k of the discrete Euler-Lagrange equations is a momentum; over the node's weight, a force.
 
     In units of length the same row would be h^2 / m times smaller and hide what it is to show.
     """
-    rows = np.zeros_like(case.position)
-    np.add.at(rows, case.at, case.momenta)
-    rows[0] += case.boundary_momentum(0)
-    rows[-1] -= case.boundary_momentum(-1)
-    defect = np.abs(rows) * (case.mass / case.weights)[:, None]
+    rows = np.zeros_like(evidence.position)
+    np.add.at(rows, evidence.at, evidence.momenta)
+    rows[0] += evidence.boundary_momentum(0)
+    rows[-1] -= evidence.boundary_momentum(-1)
+    defect = np.abs(rows) * (evidence.mass / evidence.weights)[:, None]
     node, axis = np.unravel_index(np.argmax(defect), defect.shape)
     scene = np.max(
-        [case.mass.max() * np.abs(case.pulls).max(), case.mass.max() * case.speed / case.path.duration]
+        [
+            evidence.mass.max() * np.abs(evidence.pulls).max(),
+            evidence.mass.max() * evidence.speed / evidence.path.duration,
+        ]
     )
-    scale = np.max([case.problem.actuator.force_limit() or 0.0, case.largest, 1e-3 * scene])
+    scale = np.max([evidence.problem.actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
     # positions are known to a rounding error of their size: no row can be better than that over h^2
-    floor = case.mass.max() * case.rounding / case.shortest**2
+    floor = evidence.mass.max() * evidence.rounding / evidence.shortest**2
     note = f"at dynamics[{node}].{'xyz'[axis]}"
     return _check("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
 
 
-def _rollout(case: Case) -> Check:
+def _rollout(evidence: Evidence) -> Check:
     """March the scheme from the start; what the transfer itself amplifies is not held against the path."""
-    begin, n = case.boundary_momentum(0), case.problem.dimension
-    q, p = rollout(case.dynamics, case.path, case.begin, case.position[0], begin)
-    miss, slip = np.abs(q - case.position[case.ends]).max(), np.abs(p - case.momentum).max()
-    scale = np.repeat([case.extent, case.speed], n)
-    growth = _amplification(case.matrices * scale / scale[:, None])
-    turned = ROUNDING * case.acceleration * case.path.duration
-    floor = case.rounding / case.extent + (case.rounding / case.shortest + turned) / case.speed
+    begin, n = evidence.boundary_momentum(0), evidence.problem.dimension
+    q, p = rollout(evidence.dynamics, evidence.path, evidence.begin, evidence.position[0], begin)
+    miss, slip = np.abs(q - evidence.position[evidence.ends]).max(), np.abs(p - evidence.momentum).max()
+    scale = np.repeat([evidence.extent, evidence.speed], n)
+    growth = _amplification(evidence.matrices * scale / scale[:, None])
+    turned = ROUNDING * evidence.acceleration * evidence.path.duration
+    floor = (
+        evidence.rounding / evidence.extent + (evidence.rounding / evidence.shortest + turned) / evidence.speed
+    )
     limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
     note = f"{miss:.2g} m, {slip:.2g} m/s; path amplifies errors {growth:.2g} times"
-    return _check("rollout", np.max([miss / case.extent, slip / case.speed]), limit, "of the path", note)
+    return _check(
+        "rollout", np.max([miss / evidence.extent, slip / evidence.speed]), limit, "of the path", note
+    )
 
 
 def _amplification(matrices: np.ndarray) -> float:
@@ -154,77 +161,87 @@ def _amplification(matrices: np.ndarray) -> float:
     return float(np.nan_to_num(sizes.max(), nan=np.inf))
 
 
-def _reference(case: Case) -> Check:
+def _reference(evidence: Evidence) -> Check:
     """The equations of motion, integrated without the scheme, meet the goal."""
-    q, v = reference(case.dynamics, case.path, case.begin, case.path.start_velocity)
-    miss, slip = np.linalg.norm(q - case.position[-1]), np.linalg.norm(v - case.path.goal_velocity)
+    q, v = reference(evidence.dynamics, evidence.path, evidence.begin, evidence.path.start_velocity)
+    miss, slip = np.linalg.norm(q - evidence.position[-1]), np.linalg.norm(v - evidence.path.goal_velocity)
     note = f"misses the goal by {miss:.2g} m and {slip:.2g} m/s"
     return _check(
-        "reference", np.max([miss / case.extent, slip / case.speed]), _accuracy(case), "of the path", note
+        "reference",
+        np.max([miss / evidence.extent, slip / evidence.speed]),
+        _accuracy(evidence),
+        "of the path",
+        note,
     )
 
 
-def _accuracy(case: Case) -> float:
+def _accuracy(evidence: Evidence) -> float:
     """What the error of the discretisation may be: ten times the tolerance if there is one."""
-    return REFERENCE if case.solution.tolerance is None else 10 * case.solution.tolerance
+    return REFERENCE if evidence.solution.tolerance is None else 10 * evidence.solution.tolerance
 
 
-def _ledger(case: Case) -> Check:
+def _ledger(evidence: Evidence) -> Check:
     """Momentum and mass: discrete sums, exact. Energy: the work is a quadrature, of the scheme's order.
 
     And the velocities, momenta and forces that the solution reports are those of its path.
     """
-    impulse = case.momenta.sum(axis=0)
-    change = case.boundary_momentum(-1) - case.boundary_momentum(0)
-    gross = np.abs(impulse).sum() + case.speed
+    impulse = evidence.momenta.sum(axis=0)
+    change = evidence.boundary_momentum(-1) - evidence.boundary_momentum(0)
+    gross = np.abs(impulse).sum() + evidence.speed
     momentum = np.abs(change - impulse.sum(axis=0)).max() / gross
-    masses = node_masses(case.dynamics, case.path, case.problem.mass)
-    mass = np.abs(case.mass - masses).max() / case.problem.mass
-    exact = LEDGER + ROUNDING * case.acceleration * case.path.duration / gross
-    value = np.max([momentum, mass, case.misreported()])
-    note, accuracy, energy = "energy is not kept here", _accuracy(case), _energy_gap(case)
+    masses = node_masses(evidence.dynamics, evidence.path, evidence.problem.mass)
+    mass = np.abs(evidence.mass - masses).max() / evidence.problem.mass
+    exact = LEDGER + ROUNDING * evidence.acceleration * evidence.path.duration / gross
+    value = np.max([momentum, mass, evidence.misreported()])
+    note, accuracy, energy = "energy is not kept here", _accuracy(evidence), _energy_gap(evidence)
     if energy is not None:
         note = f"energy to {energy:.1e} of {accuracy:g}"
-    if case.mass.min() < case.mass.max():
+    if evidence.mass.min() < evidence.mass.max():
         note += f", mass to {mass:.1e}"
     if energy is not None and not energy <= accuracy:
         return _check("ledger", energy, accuracy, "of the energy", note)
     return _check("ledger", value, exact, "of the impulse", note)
 
 
-def _energy_gap(case: Case) -> float | None:
+def _energy_gap(evidence: Evidence) -> float | None:
     """Change of energy against work, over the largest of kinetic energy and total work; None if not kept."""
-    t, q, v, m = state_symbols(case.problem.dimension)
-    potential = ca.SX(specific_lagrangian(case.problem.effects, t, q, v, m))
-    if ca.depends_on(potential, t) or (case.dynamics.actuator.burns and ca.depends_on(potential, m)):
+    t, q, v, m = state_symbols(evidence.problem.dimension)
+    potential = ca.SX(specific_lagrangian(evidence.problem.effects, t, q, v, m))
+    if ca.depends_on(potential, t) or (evidence.dynamics.actuator.burns and ca.depends_on(potential, m)):
         return None
-    at = [(case.time[i], case.position[i], case.velocity[i], case.mass[i]) for i in (0, -1)]
-    change = float(case.dynamics.energy(*at[1])) - float(case.dynamics.energy(*at[0]))
-    push = case.point[1]
-    if not case.path.hold:
-        parts = np.sum((case.force / case.mass[:, None] + push) * case.node_velocity, axis=1) * case.weights
+    at = [(evidence.time[i], evidence.position[i], evidence.velocity[i], evidence.mass[i]) for i in (0, -1)]
+    change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
+    push = evidence.point[1]
+    if not evidence.path.hold:
+        parts = (
+            np.sum((evidence.force / evidence.mass[:, None] + push) * evidence.node_velocity, axis=1)
+            * evidence.weights
+        )
     else:
-        moves, middle = np.diff(case.position[case.ends], axis=0), case.mass[case.at].mean(axis=0)
-        work = np.sum(case.force * moves, axis=1) / middle
-        parts = np.concatenate([work, np.sum(push * case.node_velocity, axis=1) * case.weights])
-    return float(abs(change - parts.sum()) / max(0.5 * case.speed**2, np.abs(parts).sum()))
+        moves, middle = (
+            np.diff(evidence.position[evidence.ends], axis=0),
+            evidence.mass[evidence.at].mean(axis=0),
+        )
+        work = np.sum(evidence.force * moves, axis=1) / middle
+        parts = np.concatenate([work, np.sum(push * evidence.node_velocity, axis=1) * evidence.weights])
+    return float(abs(change - parts.sum()) / max(0.5 * evidence.speed**2, np.abs(parts).sum()))
 
 
-def _bounds(case: Case) -> Check:
+def _bounds(evidence: Evidence) -> Check:
     """The limit that is broken most against what it is allowed."""
-    worst = max(excesses(case), key=lambda limit: limit.share)
+    worst = max(excesses(evidence), key=lambda limit: limit.share)
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
-    shortest, longest = case.problem.duration_bounds
-    below, above = case.path.duration - shortest, longest - case.path.duration
-    if case.problem.free_duration and min(below, above) < 1e-6 * longest:
+    shortest, longest = evidence.problem.duration_bounds
+    below, above = evidence.path.duration - shortest, longest - evidence.path.duration
+    if evidence.problem.free_duration and min(below, above) < 1e-6 * longest:
         bound = "shortest" if below < above else "longest"
-        note += f"; the duration sits on its {bound} limit of {case.path.duration:g} s"
+        note += f"; the duration sits on its {bound} limit of {evidence.path.duration:g} s"
     return _check("bounds", worst.value, worst.allowed, worst.unit, note)
 
 
-def _optimality(case: Case) -> Check:
+def _optimality(evidence: Evidence) -> Check:
     """First-order conditions: for least effort lambda = -m F, but for what limits of the force add to it."""
-    left = stationarity(case)
+    left = stationarity(evidence)
     note = (
         f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "
         f"objective {left.objective:.0e}"
@@ -232,14 +249,16 @@ def _optimality(case: Case) -> Check:
     return _check("optimality", left.largest, OPTIMALITY, "-", note)
 
 
-def _stability(case: Case) -> Check:
+def _stability(evidence: Evidence) -> Check:
     """Spectral radius of each one-step matrix over that of the exact flow, both frozen at the step."""
-    growth = growth_along(case.dynamics, case.path, case.begin, case.velocity, case.matrices)
+    growth = growth_along(
+        evidence.dynamics, evidence.path, evidence.begin, evidence.velocity, evidence.matrices
+    )
     note = f"h omega = {growth.frequency:.2g} at most"
     return _check("stability", growth.value, growth.limit, "growth a step", note)
 
 
-CHECKS: dict[str, Callable[[Case], Check]] = {
+CHECKS: dict[str, Callable[[Evidence], Check]] = {
     "residual": _residual,
     "rollout": _rollout,
     "reference": _reference,

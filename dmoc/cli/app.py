@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
 from dmoc.cli import study as study_command
 from dmoc.cli import sweep as sweep_command
@@ -23,26 +24,23 @@ from dmoc.cli.options import (
     Json,
     Name,
     Order,
-    Quiet,
     Settings,
     Source,
     Steps,
     Version,
     attached,
-    best_start,
     draw_solution,
     ends_at_once,
     fail,
     problem_of,
     show_answer,
     switch,
-    watched,
     writable,
 )
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
-# Typer exports only one of its usage errors; this is the class of all of them.
+# The class of all usage errors. Typer exports only one that derives from it.
 USAGE_ERROR: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
@@ -70,78 +68,29 @@ def list_problems() -> None:
 
 
 @app.command(epilog="Example: dmoc show free_flyer")
-def show(problem: Name, settings: Settings = None) -> None:
+def show(name: Name, settings: Settings = None) -> None:
     """Say what a problem is: the scene, its parameters, the size of its NLP."""
     from dmoc.nlp.transcription import transcribe
     from dmoc.reports import words as report
     from dmoc.solver.meshes import DEFAULT_STEPS
 
-    file, case = problem_of(problem, settings)
-    nlp = transcribe(case, DEFAULT_STEPS[2])
+    file, problem = problem_of(name, settings)
+    nlp = transcribe(problem, DEFAULT_STEPS[2])
     console = report.console()
-    tables = (report.scene(case), report.parameters(file.parameters), report.sizes(nlp))
+    tables = (report.scene(problem), report.parameters(file.parameters), report.sizes(nlp))
     for part in (report.prose(file.docstring), *tables):
         console.print(part, "", sep="\n")
-    console.print(f"{file.path}; solve it with: dmoc solve {problem}")
+    console.print(f"{file.path}; solve it with: dmoc solve {name}")
 
 
-@app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")
-def solve(
-    problem: Name,
-    order: Order = None,
-    steps: Steps = None,
-    tol: Annotated[
-        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
-    ] = None,
-    hold: Hold = False,
-    settings: Settings = None,
-    out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
-    guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
-    starts: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
-        ),
-    ] = 1,
-    as_json: Json = False,
-    compiled: Annotated[
-        bool,
-        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
-    ] = False,
-    quiet: Quiet = False,
-) -> None:
-    """Solve a problem, check the answer, show both."""
-    import dmoc
-
-    writable(out)
-    writable(plot, drawn=True)
-    # what a problem file prints must not come between the lines of the JSON object
-    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
-        file, case = problem_of(problem, settings)
-        start: Any = None if guess is None else dmoc.load(guess)
-        unit = case.objective.unit_with(case.actuator)
-        if starts > 1:
-            start = best_start(case, starts, order, hold, start, None if as_json or quiet else unit)
-        with watched(as_json or quiet, unit) as progress:
-            solution = dmoc.solve(
-                case, order, steps, tol, hold, guess=start, progress=progress, compiled=compiled
-            )
-        from dmoc.checks.verification import verify
-
-        verdict = verify(solution) if solution.success else None
-    if out is not None:
-        solution.save(out, source_hash=file.source_hash)
-    if plot is not None:
-        from dmoc.plots.page import save_figure
-
-        save_figure(solution, plot, verdict)
-    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
+app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")(
+    solve_command.solve
+)
 
 
 @app.command(epilog="Example: dmoc effects leo_raise --all")
 def effects(
-    problem: Name,
+    name: Name,
     order: Order = None,
     steps: Steps = None,
     hold: Hold = False,
@@ -156,16 +105,16 @@ def effects(
     from dmoc.reports.tables import influence_table
     from dmoc.studies.effects import influences
 
-    _, case = problem_of(problem, settings)
-    solution = dmoc.solve(case, order=order, steps=steps, hold=hold)
+    _, problem = problem_of(name, settings)
+    solution = dmoc.solve(problem, order=order, steps=steps, hold=hold)
     if not solution.success:
         show_answer(solution, None, as_json=False)
     report.console().print(influence_table(influences(solution, others), solution))
 
 
-@app.command("simulate", epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
-def march(
-    problem: Name,
+@app.command(epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
+def simulate(
+    name: Name,
     order: Order = None,
     steps: Steps = None,
     hold: Hold = False,
@@ -176,7 +125,6 @@ def march(
 ) -> None:
     """March the integrator forward from the start, without optimisation."""
     import dmoc
-    from dmoc.motion.march import simulate
     from dmoc.nlp.transcription import check_mesh
     from dmoc.reports import words as report
 
@@ -184,20 +132,20 @@ def march(
         check_mesh(steps)
     if controls is not None and (order, steps, hold) != (None, None, False):
         raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
-    _, case = problem_of(problem, settings)
-    known = None if controls is None else dmoc.load(controls).attach(case)
+    _, problem = problem_of(name, settings)
+    known = None if controls is None else dmoc.load(controls).attach(problem)
     with ends_at_once():
-        trajectory = simulate(case, known, steps, 2 if order is None else order, hold)
-    report.console().print(report.motion(trajectory, case, coast=known is None))
+        trajectory = dmoc.simulate(problem, known, steps, 2 if order is None else order, hold)
+    report.console().print(report.motion(trajectory, problem, coast=known is None))
 
 
 @app.command(epilog="Example: dmoc check flight.nc")
-def check(file: File, problem: Source = None, as_json: Json = False) -> None:
+def check(file: File, source: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.checks.verification import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
-        solution = attached(file, problem)
+        solution = attached(file, source)
         verdict = verify(solution)
     show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
 
@@ -206,7 +154,7 @@ def check(file: File, problem: Source = None, as_json: Json = False) -> None:
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
-    problem: Source = None,
+    source: Source = None,
 ) -> None:
     """Draw a saved solution, or the result of a sweep."""
     from dmoc.reports import words as report
@@ -217,15 +165,15 @@ def plot(
     if sweep_data.is_sweep(file):
         from dmoc.plots.sweep import save_sweep
 
-        save_sweep(sweep_data.read(file), target)
+        save_sweep(sweep_data.read_sweep(file), target)
     else:
-        draw_solution(file, target, problem)
+        draw_solution(file, target, source)
     report.console().print(f"wrote {target}")
 
 
-@app.command("export", epilog="Example: dmoc export free_flyer planner --steps 40 --hold")
-def take_away(
-    problem: Name,
+@app.command(epilog="Example: dmoc export free_flyer planner --steps 40 --hold")
+def export(
+    name: Name,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new folder, or one of an earlier export.")],
     order: Order = None,
     steps: Steps = None,
@@ -242,8 +190,8 @@ def take_away(
     import dmoc
     from dmoc.reports import words as report
 
-    _, case = problem_of(problem, settings)
-    paths = dmoc.export(case, folder, 2 if order is None else order, steps, hold, c=not no_c)
+    _, problem = problem_of(name, settings)
+    paths = dmoc.export(problem, folder, 2 if order is None else order, steps, hold, c=not no_c)
     functions = json.loads(paths[0].read_text())["functions"]
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))
@@ -260,19 +208,13 @@ def doctor() -> None:
     report.console().print(findings_table(examine()))
 
 
-app.command("sweep", epilog="Example: dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc")(
-    sweep_command.sweep
-)
-
-
-app.command(
-    "study", epilog="Example: dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"
-)(study_command.study)
-
-
-app.command("stability", epilog="Example: dmoc stability --revolutions 1000 --plot stability.png")(
-    stability_command.stability
-)
+# Verbs that take more than a page have files of their own.
+for _verb, _example in (
+    (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
+    (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
+    (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),
+):
+    app.command(epilog=f"Example: {_example}")(_verb)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:

@@ -13,16 +13,27 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.basics.plain import unbroken
+
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
     from dmoc.scene.problem_file import ProblemFile
 
-# A switch takes no value, so the help shows none beside it.
+# An option that takes no value; without the empty metavar the help would show its type beside it.
 switch = partial(typer.Option, metavar="")
 
-SOLVED, BAD_INPUT, NOT_SOLVED, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+# Exit code where all is well: solved, and every check holds.
+SOLVED = 0
+# Exit code where the input has no meaning; nothing was solved.
+BAD_INPUT = 2
+# Exit code where no optimum was found.
+NOT_SOLVED = 3
+# Exit code where an optimum was found but a check of it fails.
+CHECK_FAILED = 4
+# Exit code after Ctrl-C: 128 and the number of the signal, as shells have it.
+INTERRUPTED = 130
 
 
 def names_like(begun: str) -> list[str]:
@@ -46,6 +57,7 @@ Name = Annotated[
         metavar="PROBLEM", help="A name from `dmoc list`, or a path to a .py file.", autocompletion=names_like
     ),
 ]
+# The help of several commands describes FILE with these words.
 SAVED = "A solution saved with `dmoc solve --out`"
 File = Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}.")]
 Source = Annotated[
@@ -78,13 +90,13 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
     return file, file.make(**values)
 
 
-def best_start(case: Any, starts: int, order: int | None, hold: bool, guess: Any, unit: str | None) -> Any:
+def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: Any, unit: str | None) -> Any:
     """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
     from dmoc.reports import words as report
     from dmoc.reports.tables import optima_table
     from dmoc.solver.starts import local_optima
 
-    found = local_optima(case, starts, order, hold, guess)
+    found = local_optima(problem, starts, order, hold, guess)
     if unit is not None:
         report.console().print(optima_table(found, unit))
     return found[0].path if found else guess
@@ -116,22 +128,22 @@ def attached(path: Path, source: str | None) -> Solution:
         )
     file = load_problem(source or known.problem_name)
     attached = solution.attach(file.make(**known.parameters))
-    # what was saved from Python does not say which file it was made from
+    # a solution that was saved from Python has no hash: there may have been no problem file
     if known.source_hash and known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
     return attached
 
 
-def draw_solution(file: Path, target: Path, problem: str | None) -> None:
+def draw_solution(file: Path, target: Path, source: str | None) -> None:
     """Draw a saved solution; without its problem, what the file itself has."""
     import dmoc
     from dmoc.plots.page import save_figure
 
     try:
-        solution = attached(file, problem)
+        solution = attached(file, source)
     except ValueError as error:
         solution = dmoc.load(file)
-        if problem is not None:
+        if source is not None:
             raise
         warn(f"zones and limits are left out: {error}")
     save_figure(solution, target)
@@ -149,7 +161,7 @@ def show_answer(
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        print(report_json.as_text(report_json.result(solution, verdict)))
+        print(report_json.as_text(report_json.solve_object(solution, verdict)))
     else:
         from dmoc.reports import words as report
 
@@ -163,11 +175,11 @@ def show_answer(
 
 
 def warn(message: str) -> None:
-    print(f"warning: {' '.join(message.split())}", file=sys.stderr)
+    print(f"warning: {unbroken(message)}", file=sys.stderr)
 
 
 def fail(message: str, code: int) -> NoReturn:
-    print(" ".join(message.split()), file=sys.stderr)
+    print(unbroken(message), file=sys.stderr)
     sys.exit(code)
 
 
@@ -178,9 +190,9 @@ def writable(path: Path | None, drawn: bool = False, table: bool = False) -> Non
     """
     if path is None:
         return
-    from dmoc.basics.files import path_of
+    from dmoc.basics.files import as_path
 
-    folder = path_of(path).parent
+    folder = as_path(path).parent
     if not folder.is_dir():
         raise ValueError(f"cannot write {path}: there is no folder {folder}; create it first")
     special = path.exists() and not path.is_file()

@@ -34,12 +34,12 @@ def stability(
     from dmoc.studies.rounding import growth, round_off
 
     writable(plot, drawn=True)
-    orbits = [(kepler(value), per_revolution(value)) for value in _numbers(eccentricity)]
+    orbits = [(kepler(value), per_revolution(value)) for value in _eccentricities(eccentricity)]
     live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
         rounding = round_off(steps)
         edges = growth()
-        runs = [(case.name, drift(case, revolutions, methods)) for case, methods in orbits]
+        runs = [(orbit.name, drift(orbit, revolutions, methods)) for orbit, methods in orbits]
     if plot is not None:
         from dmoc.plots.stability import stability_figure
         from dmoc.plots.study import save_page
@@ -57,7 +57,7 @@ def stability(
         console.print(f"wrote {plot}")
 
 
-def _numbers(text: str) -> list[float]:
+def _eccentricities(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -65,17 +65,12 @@ def _numbers(text: str) -> list[float]:
 
 
 def _object(runs: list, rounding: list, edges: list) -> dict[str, Any]:
-    """The JSON object; numbers that are not finite become null."""
-    import math
-
+    """The JSON object."""
     figures = ("method", "steps", "revolutions", "energy_error", "momentum_error", "growth", "seconds")
-
-    def plain(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return {
         "drift": [
-            {"orbit": orbit} | {name: plain(getattr(row, name)) for name in figures}
+            {"orbit": orbit} | {name: getattr(row, name) for name in figures}
             for orbit, rows in runs
             for row in rows
         ],
@@ -101,26 +96,31 @@ def _tables(runs: list, rounding: list, edges: list) -> list[RenderableType]:
 
     parts: list[RenderableType] = []
     for orbit, rows in runs:
-        parts += [Text(f"Kepler orbit, {orbit}, {rows[0].revolutions:g} revolutions", "bold"), _drift(rows), ""]
+        parts += [
+            Text(f"Kepler orbit, {orbit}, {rows[0].revolutions:g} revolutions", "bold"),
+            _drift_table(rows),
+            "",
+        ]
     words = "largest errors, relative; growth: energy error of the last tenth over that of the first"
     parts += [Text(f"{words}, 1 where it stays bounded", "dim"), ""]
     steps = int(rounding[0].steps[-1])
     parts.append(Text(f"Rounding: equation (16) marched {steps:,} steps along a circle", "bold"))
-    table = _table("form", "angular momentum", "place against compensated [radii]")
+    table = _right_aligned("form", "angular momentum", "place against compensated [radii]")
     for row in rounding:
         table.add_row(row.form, f"{row.momentum_error[-1]:.1e}", f"{row.miss:.1e}")
     parts += [table, "", Text("Longest stable steps: h times the rate of an oscillation", "bold")]
-    table = _table("method", "stable up to", "then grows a step by up to", "loses a step at 1")
+    table = _right_aligned("method", "stable up to", "then grows a step by up to", "loses a step at 1")
     for row in edges:
         low, high, most = row.gaps[0]
         until = f"{most:.4g} (until {high:.3f})" if high < row.reach[-1] else f"{most:.4g}"
+        # a growth below 1 is amplitude lost; at h omega = 1 a step is a sixth of an oscillation
         lost = 1 - float(row.growth[row.reach.searchsorted(1.0)])
         table.add_row(row.method, f"{low:.3f}", until, f"{lost:.1e}" if lost > 1e-12 else "nothing")
     return [*parts, table]
 
 
-def _drift(rows: list) -> Table:
-    table = _table("method", "steps/rev", "us/rev", "energy", "angular momentum", "growth")
+def _drift_table(rows: list) -> Table:
+    table = _right_aligned("method", "steps/rev", "us/rev", "energy", "angular momentum", "growth")
     for row in rows:
         table.add_row(
             row.method,
@@ -133,10 +133,7 @@ def _drift(rows: list) -> Table:
     return table
 
 
-def _table(*columns: str) -> Table:
-    from rich.table import Table
+def _right_aligned(*columns: str) -> Table:
+    from dmoc.reports.words import plain_table
 
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i else "left")
-    return table
+    return plain_table(columns, numbers=slice(1, None), unbroken=slice(0), gap=1)

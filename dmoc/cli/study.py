@@ -15,7 +15,7 @@ from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, writabl
 
 
 def study(
-    problem: Name,
+    name: Name,
     orders: Annotated[str, typer.Option(metavar="N,N,...", help="Of 2, 4, 6, 8.")] = "2,4,6,8",
     steps: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of steps; if not given, some for each order.")
@@ -56,21 +56,21 @@ def study(
     chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
     live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
-        case = load_problem(problem).make(**parse_settings(settings or ()))
+        problem = load_problem(name).make(**parse_settings(settings or ()))
         methods = {} if against is None else load_methods(against)
         told = live.update if live else None
-        trials = work_precision(case, chosen, meshes, repeats, methods, reference, cold, compiled, told)
+        trials = work_precision(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
-        save_study(trials, plot, f"{case.name.replace('_', ' ')}: what accuracy costs in time")
+        save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time")
     if csv is not None:
         report_study.write_csv(trials, csv)
     if as_json:
         from dmoc.reports.as_json import as_text
 
-        print(as_text(report_study.study_object(case.name, trials)))
+        print(as_text(report_study.study_object(problem.name, trials)))
         return
     console = report.console()
-    unit = case.objective.unit_with(case.actuator)
+    unit = problem.objective.unit_with(problem.actuator)
     console.print(report_study.study_tables(trials, unit, console.width))
     for path in filter(None, (plot, csv)):
         console.print(f"wrote {path}")

@@ -29,7 +29,7 @@ from dmoc.cli.options import (
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
-    from dmoc.sweeps.loop import Progress
+    from dmoc.sweeps.loop import SweepProgress
 
 
 def sweep(
@@ -74,36 +74,26 @@ def sweep(
     """
     from dmoc.scene.problem_file import parse_settings
     from dmoc.sweeps import sweep as sweeping
-    from dmoc.sweeps.journal import journal_of
     from dmoc.sweeps.plan import parse_vary
 
     writable(out)
     begun = time.perf_counter()
-    with _live(not quiet) as (progress, tries):
-        try:
-            data = sweeping.sweep(
-                problem,
-                parse_vary(vary),
-                out,
-                settings=parse_settings(settings or ()),
-                sample=sample,
-                method=method,
-                seed=seed,
-                order=order,
-                steps=steps,
-                tol=tol,
-                hold=hold,
-                follow=follow,
-                workers=workers,
-                scheduler=scheduler,
-                restart=restart,
-                progress=progress,
-            )
-        except KeyboardInterrupt:
-            if (journal := journal_of(out)).exists():
-                words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
-                print(f"{words}; give the same command again to go on", file=sys.stderr)
-            raise typer.Exit(INTERRUPTED) from None
+    numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
+    spread: dict[str, Any] = {"sample": sample, "method": method, "seed": seed}
+    with _live(not quiet) as (progress, tries), _says_what_is_kept(out, tries):
+        data = sweeping.sweep(
+            problem,
+            parse_vary(vary),
+            out,
+            settings=parse_settings(settings or ()),
+            follow=follow,
+            workers=workers,
+            scheduler=scheduler,
+            restart=restart,
+            progress=progress,
+            **numerics,
+            **spread,
+        )
     raise typer.Exit(_show(data, out, time.perf_counter() - begun, tries["done"] - tries["before"], quiet))
 
 
@@ -137,7 +127,21 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
 
 
 @contextmanager
-def _live(wanted: bool) -> Iterator[tuple[Progress, dict[str, int]]]:
+def _says_what_is_kept(out: Path, tries: dict[str, int]) -> Iterator[None]:
+    """Ctrl-C ends the program with a word on how many points are kept, if any are."""
+    from dmoc.sweeps.journal import journal_of
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if (journal := journal_of(out)).exists():
+            words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
+            print(f"{words}; give the same command again to go on", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def _live(wanted: bool) -> Iterator[tuple[SweepProgress, dict[str, int]]]:
     """A `progress` that keeps one line of a terminal up to date, and what it was last told."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number, short, vector
-from dmoc.effects.base import Force, Part, need_dimension
-from dmoc.effects.motion import as_column, tried
+from dmoc.basics.arguments import checked, matching_length, number, short, vector
+from dmoc.effects.base import Force, Part
+from dmoc.effects.given import as_column, tried
 
-# |w| is rounded to sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], so that drag has derivatives of every order at rest.
+# Drag computes the speed |w| against the air as sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], which has derivatives of
+# every order at rest too; a micrometre a second changes no force that matters.
 SPEED_FLOOR = 1e-6
 
 
@@ -31,7 +32,7 @@ class Wind(Part):
 
     def __post_init__(self) -> None:
         if not callable(self.field):
-            object.__setattr__(self, "field", vector("wind", self.field, "m/s"))
+            checked(self, field=vector("wind", self.field, "m/s"))
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError unless the field gives one velocity an axis."""
@@ -41,7 +42,7 @@ class Wind(Part):
         )
         symbols = [ca.SX.sym("t"), ca.SX.sym("q", dimension)]
         entries = tried(f"wind in {dimension} dimensions", self.velocity, symbols, remedy)
-        need_dimension(self, "the velocity", entries, dimension)
+        matching_length(self, "the velocity", entries, dimension)
 
     def velocity(self, t: Any, q: Any) -> Any:
         """Velocity of the air [m/s]."""
@@ -49,7 +50,17 @@ class Wind(Part):
 
 
 class Atmosphere(Part, ABC):
-    """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own."""
+    """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own.
+
+    Whoever implements an atmosphere
+
+    1. gives `density_at` with CasADi operations alone, smooth, never negative, and finite at places where only
+       a guess goes, such as the inside of a planet;
+    2. gives `velocity_at` if the air moves: wind, or rotation with the planet;
+    3. overrides `check_dimension` where it has no meaning in one, two or three dimensions.
+
+    Not its business: the force, which `Drag` makes of density and velocity, and the body's area.
+    """
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the atmosphere has no meaning in this many dimensions."""
@@ -79,8 +90,11 @@ class UniformAtmosphere(Atmosphere):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "density", number("density", self.density, "kg/m^3", nonnegative=True))
-        object.__setattr__(self, "wind", _wind(self.wind))
+        checked(
+            self,
+            density=number("density", self.density, "kg/m^3", nonnegative=True),
+            wind=_wind(self.wind),
+        )
 
     def check_dimension(self, dimension: int) -> None:
         if self.wind is not None:
@@ -130,12 +144,15 @@ class ExponentialAtmosphere(Atmosphere):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "density", number("density", self.density, "kg/m^3", nonnegative=True))
-        object.__setattr__(self, "height", number("height", self.height, "m"))
-        for name in ("scale_height", "radius"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "m", positive=True))
-        object.__setattr__(self, "rate", number("rate", self.rate, "rad/s"))
-        object.__setattr__(self, "wind", _wind(self.wind))
+        checked(
+            self,
+            density=number("density", self.density, "kg/m^3", nonnegative=True),
+            height=number("height", self.height, "m"),
+            scale_height=number("scale_height", self.scale_height, "m", positive=True),
+            radius=number("radius", self.radius, "m", positive=True),
+            rate=number("rate", self.rate, "rad/s"),
+            wind=_wind(self.wind),
+        )
         if self.height >= self.radius:
             raise ValueError(
                 f"ExponentialAtmosphere: height is above the surface and must be less than the radius; "
@@ -149,7 +166,8 @@ class ExponentialAtmosphere(Atmosphere):
             self.wind.check_dimension(dimension)
 
     def density_at(self, t: Any, q: Any) -> Any:
-        # the second term vanishes by rounding outside of the sphere, and gives the root a slope at its centre
+        # at the centre of the sphere the square root alone has no derivative; the second term gives it one, and
+        # is lost in rounding outside of the sphere
         distance = ca.sqrt(ca.dot(q, q) + (1e-9 * self.radius) ** 2)
         above = ca.fmax(distance - self.radius, -5 * self.scale_height)
         return self.density * ca.exp((self.height - above) / self.scale_height)
@@ -187,9 +205,10 @@ class Drag(Force):
     atmosphere: Atmosphere
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "area", number("area", self.area, "m^2", nonnegative=True))
-        object.__setattr__(
-            self, "drag_coefficient", number("drag_coefficient", self.drag_coefficient, "-", nonnegative=True)
+        checked(
+            self,
+            area=number("area", self.area, "m^2", nonnegative=True),
+            drag_coefficient=number("drag_coefficient", self.drag_coefficient, "-", nonnegative=True),
         )
         if not isinstance(self.atmosphere, Atmosphere):
             raise ValueError(
@@ -223,10 +242,11 @@ class LinearDrag(Force):
     wind: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "coefficient", number("coefficient", self.coefficient, "N s/m", nonnegative=True)
+        checked(
+            self,
+            coefficient=number("coefficient", self.coefficient, "N s/m", nonnegative=True),
+            wind=_wind(self.wind),
         )
-        object.__setattr__(self, "wind", _wind(self.wind))
 
     def check_dimension(self, dimension: int) -> None:
         if self.wind is not None:

@@ -49,7 +49,22 @@ class Attractor(NamedTuple):
 
 
 class Effect(Part, ABC):
-    """Something that acts on the body. Derive from `Conservative` or `Force`, never from this."""
+    """Something that acts on the body. Derive from `Conservative` or `Force`, never from this.
+
+    Whoever implements an effect
+
+    1. makes it a frozen dataclass whose fields are its numbers, checked in `__post_init__`;
+    2. names each field in the section Parameters of its docstring, with its unit in brackets, which is what
+       `words` shows;
+    3. implements one method, `lagrangian` or `force`, with CasADi operations alone, in SI units, of a column
+       `q` with as many entries as the problem has dimensions;
+    4. keeps that expression smooth wherever the optimiser may go, also beside the path: it is differentiated
+       twice;
+    5. overrides `check_dimension` where it has no meaning in one, two or three dimensions.
+
+    Not its business: inertia (1/2 |v|^2 is there already), the actuator's force, derivatives, scaling, the
+    scheme, and which other effects there are: contributions are added up.
+    """
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the effect has no meaning in this many dimensions."""
@@ -68,7 +83,16 @@ class Effect(Part, ABC):
 
 
 class Conservative(Effect):
-    """An effect that enters the Lagrangian and so keeps the flow symplectic."""
+    """An effect that enters the Lagrangian and so keeps the flow symplectic.
+
+    Whoever implements one has the duties of an `Effect`, and
+
+    1. states a potential energy V [J] as l = -V/m [J/kg];
+    2. keeps l at most quadratic in `v`: the momentum dl/dv must be linear in the velocity to be solved for it.
+
+    Not its business: whether energy is kept. That is read from the expression: where it contains `t`, or the
+    mass while propellant burns, the check of the energy is left out.
+    """
 
     @abstractmethod
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
@@ -76,21 +100,17 @@ class Conservative(Effect):
 
 
 class Force(Effect):
-    """An effect that does work: drag, radiation pressure and the like."""
+    """An effect that does work: drag, radiation pressure and the like.
+
+    Whoever implements one has the duties of an `Effect`, and leaves what has a potential to `Conservative`:
+    stated as a force, it would let the energy drift over long runs.
+
+    Not its business: the work that is done, which is summed up along the path, and the power of the actuator.
+    """
 
     @abstractmethod
     def force(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         """Force on the body [N]."""
-
-
-def need_dimension(effect: Any, argument: str, needed: int, dimension: int) -> None:
-    """ValueError unless the argument's length fits the problem's dimension."""
-    if needed != dimension:
-        name = type(effect).__name__
-        raise ValueError(
-            f"{name}: {argument} has {needed} entries but the problem has {dimension} dimensions; "
-            f"give {dimension} entries"
-        )
 
 
 def _in_words(value: Any, unit: str) -> str:

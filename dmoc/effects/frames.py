@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import Vector, number, vector
+from dmoc.basics.arguments import Vector, checked, number, vector
 from dmoc.effects.base import Conservative, Effect
 from dmoc.effects.gravity import PointGravity
 
@@ -35,7 +35,7 @@ class RotatingFrame(Conservative):
         rate = number("rate", self.rate, "rad/s") if single else vector("rate", self.rate, "rad/s")
         if not single and len(rate) != 3:  # type: ignore[arg-type]
             raise ValueError(f"rate must be one number (about z) or 3 numbers [rad/s]; got {self.rate!r}")
-        object.__setattr__(self, "rate", rate)
+        checked(self, rate=rate)
 
     def check_dimension(self, dimension: int) -> None:
         if dimension == 1 or (dimension == 2 and isinstance(self.rate, tuple)):
@@ -75,7 +75,7 @@ class ClohessyWiltshire(Conservative):
     mean_motion: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mean_motion", number("mean_motion", self.mean_motion, "rad/s", positive=True))
+        checked(self, mean_motion=number("mean_motion", self.mean_motion, "rad/s", positive=True))
 
     def check_dimension(self, dimension: int) -> None:
         if dimension == 1:

@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import Vector, number, vector
-from dmoc.effects.base import Attractor, Conservative, need_dimension
+from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
+from dmoc.effects.base import Attractor, Conservative
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class UniformGravity(Conservative):
     acceleration: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "acceleration", vector("acceleration", self.acceleration, "m/s^2"))
+        checked(self, acceleration=vector("acceleration", self.acceleration, "m/s^2"))
 
     def check_dimension(self, dimension: int) -> None:
-        need_dimension(self, "acceleration", len(self.acceleration), dimension)
+        matching_length(self, "acceleration", len(self.acceleration), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return ca.dot(ca.DM(self.acceleration), q)
@@ -49,17 +49,17 @@ class PointGravity(Conservative):
     center: Vector | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
+        checked(self, mu=number("mu", self.mu, "m^3/s^2", positive=True))
         if self.center is not None:
-            object.__setattr__(self, "center", vector("center", self.center, "m"))
+            checked(self, center=vector("center", self.center, "m"))
 
     def check_dimension(self, dimension: int) -> None:
         if self.center is not None:
-            need_dimension(self, "center", len(self.center), dimension)
+            matching_length(self, "center", len(self.center), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         offset = q if self.center is None else q - ca.DM(self.center)
-        # sqrt and multiplication: a power of 3/2 in the derivative would dominate the step function
+        # a square root and products, since a power of 3/2 takes longer than all the rest of a step
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 
     def attractor(self) -> Attractor:
@@ -92,9 +92,12 @@ class J2(Conservative):
     j2: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
-        object.__setattr__(self, "j2", number("j2", self.j2, "-"))
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            radius=number("radius", self.radius, "m", positive=True),
+            j2=number("j2", self.j2, "-"),
+        )
         if abs(self.j2) >= 1:
             raise ValueError(
                 f"j2 must be less than 1 [-] (1.08263e-3 for the Earth); got {self.j2:g}: "
@@ -130,11 +133,14 @@ class Spring(Conservative):
     anchor: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stiffness", number("stiffness", self.stiffness, "N/m", nonnegative=True))
-        object.__setattr__(self, "anchor", vector("anchor", self.anchor, "m"))
+        checked(
+            self,
+            stiffness=number("stiffness", self.stiffness, "N/m", nonnegative=True),
+            anchor=vector("anchor", self.anchor, "m"),
+        )
 
     def check_dimension(self, dimension: int) -> None:
-        need_dimension(self, "anchor", len(self.anchor), dimension)
+        matching_length(self, "anchor", len(self.anchor), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         offset = q - ca.DM(self.anchor)

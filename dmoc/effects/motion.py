@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import number, vector
+from dmoc.basics.arguments import checked, number
 from dmoc.effects.base import Part
 
 
@@ -135,10 +135,13 @@ class CircularMotion(Part):
     inclination: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
-        object.__setattr__(self, "rate", number("rate", self.rate, "rad/s"))
-        for name in ("phase", "inclination"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "rad"))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            rate=number("rate", self.rate, "rad/s"),
+            phase=number("phase", self.phase, "rad"),
+            inclination=number("inclination", self.inclination, "rad"),
+        )
 
     def __call__(self, t: Any) -> Any:
         u = self.phase + self.rate * t
@@ -173,20 +176,24 @@ class KeplerMotion(Part):
     mean_anomaly: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
-        object.__setattr__(self, "a", number("a", self.a, "m", positive=True))
-        object.__setattr__(self, "e", number("e", self.e, "-", nonnegative=True))
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            a=number("a", self.a, "m", positive=True),
+            e=number("e", self.e, "-", nonnegative=True),
+        )
         if self.e > 0.99:
             raise ValueError(
                 f"e must not exceed 0.99 [-]; got {self.e:g}: give such a motion as a table (tabulated_motion)"
             )
-        for name in ("i", "node", "argument", "mean_anomaly"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "rad"))
+        angles = ("i", "node", "argument", "mean_anomaly")
+        checked(self, **{name: number(name, getattr(self, name), "rad") for name in angles})
 
     def __call__(self, t: Any) -> Any:
         e, mean = self.e, self.mean_anomaly + math.sqrt(self.mu / self.a) / self.a * t
         anomaly = mean + e * ca.sin(mean) / ca.sqrt(1 - 2 * e * ca.cos(mean) + e * e)
-        # convergence is quadratic: two iterations reach round-off up to e = 0.3, six up to 0.99
+        # the number of iterations is fixed, so that the expression is one for all times. Newton's method
+        # doubles the digits: two iterations reach round-off up to e = 0.3, six up to 0.99
         for _ in range(2 if e <= 0.3 else 6):
             anomaly -= (anomaly - e * ca.sin(anomaly) - mean) / (1 - e * ca.cos(anomaly))
         along = self.a * (ca.cos(anomaly) - e)
@@ -221,7 +228,8 @@ class TabulatedMotion(Part):
     def __post_init__(self) -> None:
         try:
             times, positions = np.asarray(self.times, float), np.asarray(self.positions, float)
-        except Exception:  # whatever a user's objects raise
+        except Exception:
+            # the conversion of a user's own objects may raise anything
             raise ValueError("times and positions must be numbers [s], [m]") from None
         if times.ndim != 1 or len(times) < 4 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError(
@@ -233,8 +241,11 @@ class TabulatedMotion(Part):
                 f"positions must be finite, of shape ({len(times)}, dimension), one row a time [m]; "
                 f"got shape {positions.shape}"
             )
-        object.__setattr__(self, "times", tuple(times.tolist()))
-        object.__setattr__(self, "positions", tuple(map(tuple, positions.tolist())))
+        checked(
+            self,
+            times=tuple(times.tolist()),
+            positions=tuple(map(tuple, positions.tolist())),
+        )
 
     @cached_property
     def _spline(self) -> tuple[ca.Function, ca.Function]:
@@ -245,55 +256,6 @@ class TabulatedMotion(Part):
 
     def __call__(self, t: Any) -> Any:
         position, slope = self._spline
-        # CasADi's spline is zero outside of its table: straight on instead, with a continuous slope
+        # CasADi's spline is zero outside of its table; the motion goes on straight ahead there instead
         inside = ca.fmin(ca.fmax(t, self.times[0]), self.times[-1])
         return position(inside) + slope(inside) * (t - inside)
-
-
-def given_motion(owner: str, name: str, value: Any) -> Any:
-    """A function of time that has been tried, or a fixed position as a tuple; else ValueError."""
-    if not callable(value):
-        return vector(f"{owner}: {name}", value, "m")
-    remedy = (
-        "it must take a CasADi time [s] and give 2 or 3 numbers [m]: write it with casadi's functions "
-        "(casadi.cos, not math.cos), or give data as tabulated_motion(times, positions)"
-    )
-    entries = tried(f"{owner}: {name}", value, [ca.SX.sym("t")], remedy)
-    if not 1 <= entries <= 3:
-        raise ValueError(f"{owner}: {name} gives {entries} numbers; {remedy}")
-    return value
-
-
-def tried(name: str, function: Any, symbols: list, remedy: str) -> int:
-    """How many entries a user's function of CasADi symbols gives; ValueError if it fails or gives NaN."""
-    column = evaluated(name, function, symbols, remedy)
-    probe = ca.Function("probe", symbols, [ca.densify(ca.sum1(column))])
-    # Python's own math turns a symbol into NaN without a word; a good function may be undefined somewhere
-    places = [0.0, 0.37, 1.0, 1e3, 1e6]
-    if all(np.isnan(float(probe(*[x] * len(symbols)))) for x in places):
-        raise ValueError(f"{name} gives no number; {remedy}")
-    return column.numel()
-
-
-def evaluated(name: str, function: Any, symbols: list, remedy: str) -> Any:
-    """The column that a user's function of CasADi symbols gives; ValueError if it fails or gives none."""
-    try:
-        column = as_column(function(*symbols))
-        ca.Function("probe", symbols, [column])
-    except Exception as error:
-        raise ValueError(f"{name} fails ({' '.join(str(error).split())[:120]}); {remedy}") from error
-    if not column.numel():
-        raise ValueError(f"{name} gives nothing; {remedy}")
-    return column
-
-
-def position_at(motion: Any, t: Any, dimension: int) -> Any:
-    """The position [m] of a motion, or a fixed one, with as many entries as the problem has axes if it can."""
-    column = as_column(motion(t) if callable(motion) else motion)
-    return column[:2] if dimension == 2 and column.numel() == 3 and column[2].is_zero() else column
-
-
-def as_column(value: Any) -> Any:
-    """A column of what a user's function gave: a CasADi matrix, an array or a list."""
-    column = value if isinstance(value, (ca.SX, ca.MX, ca.DM)) else ca.vertcat(*np.atleast_1d(value).ravel())
-    return ca.vec(column)

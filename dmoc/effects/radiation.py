@@ -9,17 +9,30 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import number, short
-from dmoc.effects.base import Force, Part, need_dimension
-from dmoc.effects.motion import given_motion, position_at
+from dmoc.basics.arguments import checked, matching_length, number, short
+from dmoc.effects.base import Force, Part
+from dmoc.effects.given import given_motion, position_at
 
-SOLAR_PRESSURE = 4.56e-6  # [N/m^2] at one astronomical unit
-ASTRONOMICAL_UNIT = 149_597_870_700.0  # [m]
-NEAREST_SUN = 1e9  # [m]; what is nearer is a direction or not in metres
+# Pressure of sunlight on a black surface at one astronomical unit from the sun [N/m^2].
+SOLAR_PRESSURE = 4.56e-6
+# The mean distance of Earth and sun [m], exact by definition (IAU 2012).
+ASTRONOMICAL_UNIT = 149_597_870_700.0
+# A sun nearer to the origin than this [m] is refused: it must be a direction, or a position in other units, as
+# the sun alone has a radius of 7e8 m.
+NEAREST_SUN = 1e9
 
 
 class Shadow(Part, ABC):
-    """The shadow of a sphere at the origin; derive from this, as a frozen dataclass, for one of your own."""
+    """The shadow of a sphere at the origin; derive from this, as a frozen dataclass, for one of your own.
+
+    Whoever implements a shadow gives `light`
+
+    1. between 0 and 1, with CasADi operations alone, for columns of two and of three entries;
+    2. with an edge of some width, since a jump has no derivative; a step of the path must not be longer;
+    3. finite everywhere, also inside of the sphere, where only a guess goes.
+
+    Not its business: the pressure, which `RadiationPressure` multiplies by the light, and where the sun is.
+    """
 
     @abstractmethod
     def light(self, q: Any, sun: Any) -> Any:
@@ -47,8 +60,11 @@ class CylindricalShadow(Shadow):
     sharpness: float = 100.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
-        object.__setattr__(self, "sharpness", number("sharpness", self.sharpness, "-", positive=True))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            sharpness=number("sharpness", self.sharpness, "-", positive=True),
+        )
 
     def light(self, q: Any, sun: Any) -> Any:
         behind, across = _behind(q, sun / ca.sqrt(ca.dot(sun, sun)))
@@ -84,16 +100,20 @@ class ConicalShadow(Shadow):
     sun_radius: float = 6.957e8
 
     def __post_init__(self) -> None:
-        for name in ("radius", "sun_radius"):
-            object.__setattr__(self, name, number(name, getattr(self, name), "m", positive=True))
+        checked(
+            self,
+            radius=number("radius", self.radius, "m", positive=True),
+            sun_radius=number("sun_radius", self.sun_radius, "m", positive=True),
+        )
 
     def light(self, q: Any, sun: Any) -> Any:
         offset = sun - q
         distance = ca.sqrt(ca.dot(offset, offset))
         behind, across = _behind(q, offset / distance)
-        # rounded by a thousandth of the radius on the axis, by half a millionth of it at the limb
+        # the angle between the two centres. The second term rounds it: by a thousandth of the radius on the
+        # axis, where the angle alone has no derivative, and by half a millionth of the radius at the edge
         apart = ca.atan2(ca.sqrt(across + (1e-3 * self.radius) ** 2), behind)
-        # inside of the sphere, where only a guess goes, it fills half the sky
+        # inside of the sphere, where only a guess goes, the sphere is taken to fill half the sky
         beyond = ca.fmax(ca.dot(q, q) - self.radius**2, (1e-3 * self.radius) ** 2)
         sphere, disc = ca.atan2(self.radius, ca.sqrt(beyond)), ca.atan(self.sun_radius / distance)
         small, large = ca.fmin(sphere, disc), ca.fmax(sphere, disc)
@@ -133,14 +153,17 @@ class RadiationPressure(Force):
     shadow: Shadow | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "area", number("area", self.area, "m^2", nonnegative=True))
-        object.__setattr__(self, "reflectivity", number("reflectivity", self.reflectivity, "-"))
+        checked(
+            self,
+            area=number("area", self.area, "m^2", nonnegative=True),
+            reflectivity=number("reflectivity", self.reflectivity, "-"),
+        )
         if not 0 <= self.reflectivity <= 1:
             raise ValueError(
                 f"reflectivity must lie between 0 (black) and 1 (mirror) [-]; got {self.reflectivity:g}: "
                 "for a radiation pressure coefficient C_R give C_R - 1"
             )
-        object.__setattr__(self, "sun", given_motion("RadiationPressure", "sun", self.sun))
+        checked(self, sun=given_motion("RadiationPressure", "sun", self.sun))
         if self.shadow is not None and not isinstance(self.shadow, Shadow):
             raise ValueError(
                 "shadow must be a dmoc.Shadow such as CylindricalShadow(radius) or None; "
@@ -162,7 +185,7 @@ class RadiationPressure(Force):
 
     def check_dimension(self, dimension: int) -> None:
         column = position_at(self.sun, ca.SX.sym("t"), dimension)
-        need_dimension(self, "sun", column.numel(), dimension)
+        matching_length(self, "sun", column.numel(), dimension)
         if dimension == 1 and self.shadow is not None:
             raise ValueError("RadiationPressure: a shadow needs 2 or 3 dimensions; got 1")
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import casadi as ca
 
-from dmoc.basics.arguments import number
-from dmoc.effects.base import Conservative, need_dimension
-from dmoc.effects.motion import given_motion, position_at
+from dmoc.basics.arguments import checked, matching_length, number
+from dmoc.effects.base import Conservative
+from dmoc.effects.given import given_motion, position_at
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,11 @@ class ThirdBody(Conservative):
     position: Any
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
-        object.__setattr__(self, "position", given_motion("ThirdBody", "position", self.position))
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            position=given_motion("ThirdBody", "position", self.position),
+        )
         if isinstance(self.position, tuple) and not any(self.position):
             raise ValueError(
                 f"ThirdBody: position must not be the origin [m]; got {self.position!r}: "
@@ -53,13 +56,13 @@ class ThirdBody(Conservative):
 
     def check_dimension(self, dimension: int) -> None:
         column = position_at(self.position, ca.SX.sym("t"), dimension)
-        need_dimension(self, "position", column.numel(), dimension)
+        matching_length(self, "position", column.numel(), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         s = position_at(self.position, t, q.numel())
         offset, distance = s - q, ca.dot(s, s)
         x = ca.dot(q, q - 2 * s) / distance
-        # from the offset, not from x: close to the third body 1 + x would lose digits
+        # the same as sqrt(1 + x), but close to the third body, where x is near -1, the sum would lose digits
         ratio = ca.sqrt(ca.dot(offset, offset) / distance)
         tide = x * x * (ratio + 2) / (ratio * (1 + ratio) * (1 + ratio))
         return 0.5 * self.mu / ca.sqrt(distance) * (tide - ca.dot(q, q) / distance)

@@ -13,6 +13,7 @@ import numpy as np
 from dmoc.exports.functions import Exported, Scene
 from dmoc.exports.planner import Planner
 
+# What stands before CasADi's own code.
 PREFACE = """\
 /* CasADi lends the addresses of local variables to the functions it calls; GCC 12 and later take some for
    addresses that outlive the call. */
@@ -21,8 +22,10 @@ PREFACE = """\
 #endif
 """
 
+# What a C file or header of CasADi ends with if it was written whole.
 LAST_LINES = '} /* extern "C" */\n#endif\n'
 
+# The header that documents the functions.
 HEADER = """\
 /* {name}: {about}
 {documentation}
@@ -40,6 +43,7 @@ HEADER = """\
 #endif
 """
 
+# A program that calls two of them.
 EXAMPLE = """\
 /* Roll out a constant force from the start of {name}, then check the path that comes out.
    Build and run: cc -O2 main.c functions.c -lm -o transfer && ./transfer */
@@ -65,7 +69,7 @@ int main(void) {{
   for (int i = 0; i < DMOC_CONTROLS * DMOC_FORCES; ++i) forces[i] = push[i % DMOC_CONTROLS];
   if (rollout(start, found, iw, w, 0) || residual(path, rows, iw, w, 0)) return 1;
   for (int i = 0; i < DMOC_AXES * DMOC_NODES; ++i) worst = fmax(worst, fabs(defects[i]));
-  printf("position after %g s [m]:", duration);
+  printf("position after %g s [m]:", duration[0]);
   for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", positions[DMOC_AXES * (DMOC_NODES - 1) + i]);
   printf("\\nvelocity [m/s]:");
   for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", velocities[DMOC_AXES * DMOC_STEPS + i]);
@@ -82,14 +86,14 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
         generator.add(exported.function)
     generator.generate(f"{folder}{os.sep}")
     for name in ("functions.c", "functions.h"):
-        # CasADi does not say when the disk is full
+        # CasADi raises no error when the disk is full
         if not (folder / name).read_text().endswith(LAST_LINES):
             raise OSError(f"{name} could not be written whole")
     source = folder / "functions.c"
     source.write_text(PREFACE + source.read_text())
     (folder / "transfer.h").write_text(_header(planner.scene, functions))
     by_name = {exported.function.name(): exported.function for exported in functions}
-    (folder / "main.c").write_text(_example(planner, by_name["rollout"], by_name["residual"]))
+    (folder / "main.c").write_text(_example_call(planner, by_name["rollout"], by_name["residual"]))
 
 
 def _header(scene: Scene, functions: Sequence[Exported]) -> str:
@@ -124,30 +128,30 @@ def _documentation(exported: Exported) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _example(planner: Planner, rollout: ca.Function, residual: ca.Function) -> str:
+def _example_call(planner: Planner, rollout: ca.Function, residual: ca.Function) -> str:
     scene, guess = planner.scene, planner.guess
     problem, force = scene.problem, 0.1 * planner.nlp.units.force
     known = {"mass": problem.mass, "start_time": problem.start_time, "duration": guess.duration}
     known |= {name: planner.numbers.value(name) for name in scene.flow.name_in()[1:]}
     used = dict.fromkeys([*rollout.name_in(), *residual.name_in()])
-    numbers = [f"static casadi_real {name}[] = {{{_row(known[name])}}};" for name in used if name in known]
+    numbers = [f"static casadi_real {name}[] = {{{_c_values(known[name])}}};" for name in used if name in known]
     arrays = {"start_velocity": "velocity", "goal_velocity": "velocities + DMOC_AXES * DMOC_STEPS"}
     if scene.burns:
         numbers.append("static casadi_real masses[DMOC_NODES]; /* kg */")
     push = [force if label in ("x", "throttle") else 0.0 for label in problem.actuator.labels(scene.axes)]
     return EXAMPLE.format(
         name=_in_comment(problem.name),
-        position=_row(guess.position[0]),
-        velocity=_row(guess.start_velocity),
-        push=_row(push if any(push) else [force, *push[1:]]),
+        position=_c_values(guess.position[0]),
+        velocity=_c_values(guess.start_velocity),
+        push=_c_values(push if any(push) else [force, *push[1:]]),
         numbers="\n".join(numbers),
         start=", ".join(rollout.name_in()),
         path=", ".join(arrays.get(name, name) for name in residual.name_in()),
         found=", ".join(rollout.name_out()),
-    ).replace('[m]:", duration)', '[m]:", duration[0])')
+    )
 
 
-def _row(values: Any) -> str:
+def _c_values(values: Any) -> str:
     return ", ".join(repr(float(value)) for value in np.atleast_1d(values))
 
 

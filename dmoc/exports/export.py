@@ -18,7 +18,7 @@ import numpy as np
 
 from dmoc import __version__
 from dmoc.basics.arguments import flag, of_kind
-from dmoc.basics.files import path_of
+from dmoc.basics.files import as_path
 from dmoc.exports import functions as export_functions
 from dmoc.exports import planner as export_solver
 from dmoc.exports import residual as export_residual
@@ -29,8 +29,10 @@ from dmoc.motion.lobatto import scheme
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import DEFAULT_STEPS
 
-FORMAT = "dmoc export"
-FORMAT_VERSION = 1
+# The manifest names this format: a folder whose manifest does not is never written over.
+EXPORT_FORMAT = "dmoc export"
+# The version of the manifest, for programs that read it.
+EXPORT_VERSION = 1
 
 
 def export(
@@ -92,7 +94,7 @@ def export(
     steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
     of_kind("problem", problem, TransferProblem)
     hold, c = flag("hold", hold), flag("c", c)
-    target = _checked_folder(path_of(folder))
+    target = _checked_folder(as_path(folder))
     planner = Planner.of(problem, order, steps, hold, guess)
     functions = functions_of(planner, options)
     with _whole_folder(target) as work:
@@ -113,8 +115,8 @@ def functions_of(planner: Planner, options: dict[str, Any] | None = None) -> lis
     """All functions of an export; the first three can become C code."""
     scene = planner.scene
     return [
-        export_functions.step(scene),
-        export_functions.rollout(scene),
+        export_functions.one_step(scene),
+        export_functions.all_steps(scene),
         export_residual.residual(scene),
         export_residual.residual_jacobian(scene),
         export_solver.cost(planner),
@@ -135,8 +137,8 @@ def _manifest(planner: Planner, functions: list[Exported], c: bool, sums: dict[s
     scene, problem = planner.scene, planner.scene.problem
     coded = {exported.function.name() for exported in functions[:3] if c}
     return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
+        "format": EXPORT_FORMAT,
+        "format_version": EXPORT_VERSION,
         "problem": {"name": problem.name, "parameters": problem.parameters},
         "scheme": {"order": scene.rule.order, "steps": scene.steps, "hold": scene.hold, "nodes": scene.nodes},
         "controls": list(problem.actuator.labels(scene.axes)),
@@ -198,7 +200,7 @@ def _exported_before(folder: Path) -> set[str]:
     """The files an earlier export wrote to a folder."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text())
-        return {"manifest.json", *manifest["files"]} if manifest["format"] == FORMAT else set()
+        return {"manifest.json", *manifest["files"]} if manifest["format"] == EXPORT_FORMAT else set()
     except (OSError, ValueError, KeyError, TypeError):
         return set()
 

@@ -42,6 +42,7 @@ class Exported:
         return self.terms.get(name) or TERMS[name]
 
 
+# Unit and meaning of every argument that has one name in all functions.
 TERMS = {
     "position": Term("m", "position"),
     "velocity": Term("m/s", "velocity"),
@@ -157,9 +158,9 @@ def number_terms(names: Iterable[str]) -> dict[str, Term]:
 def march(scene: Scene) -> ca.Function:
     """One step of (displacement from origin, momentum per mass, mass, number of the step).
 
-    (state, controls stacked, what stays the same) -> next state, displacements and masses of nodes
-    1 .. s of the step, velocity at its end. What stays the same is one column, start_time, h, origin and
-    the numbers of the flow: a column is repeated in C without a table as long as there are steps.
+    (state, controls stacked, constants) -> next state, displacements and masses of nodes 1 .. s of the step,
+    velocity at its end. The constants, start_time, h, origin and the numbers of the flow, are one column: it
+    is the same for all steps, and generated C code then needs no table with a copy of it for every step.
     """
     n, rule, columns = scene.axes, scene.rule, scene.step_columns
     state, stacked = ca.MX.sym("state", 2 * n + 2), ca.MX.sym("u", scene.controls * columns)
@@ -174,7 +175,8 @@ def march(scene: Scene) -> ca.Function:
         masses = masses - h * (ca.DM(rule.integral) @ ca.vertcat(*flows))
     t = start_time + count * h
     dq, dp, v = step_map(scene.dynamics, rule, scene.hold)(r, p, masses, u, t, h, origin)
-    # the polynomial of a step is the integral of its slope, which s + 1 points determine
+    # positions at the inner nodes: the position in a step is a polynomial of degree s, whose slope is known at
+    # all s + 1 nodes, so that integrating the slope gives it exactly
     inner = [r + h * (v @ ca.DM(row)) for row in rule.integral[1:-1]]
     end = ca.vertcat(r + dq, p + dp, masses[-1], count + 1)
     velocity = scene.dynamics.velocity(t + h, origin + r + dq, p + dp, masses[-1])
@@ -184,7 +186,7 @@ def march(scene: Scene) -> ca.Function:
     return function.expand() if scene.explicit else function
 
 
-def step(scene: Scene) -> Exported:
+def one_step(scene: Scene) -> Exported:
     """The one-step map."""
     given = scene.symbols("position", "velocity", "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
@@ -201,7 +203,7 @@ def step(scene: Scene) -> Exported:
     return Exported(function.expand() if scene.explicit else function, words, terms)
 
 
-def rollout(scene: Scene) -> Exported:
+def all_steps(scene: Scene) -> Exported:
     """The integrator over all steps from the start."""
     given = scene.symbols("position", "velocity", "mass", "start_time", "duration", "forces")
     given |= scene.flow_numbers()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
@@ -14,11 +13,17 @@ import numpy as np
 
 from dmoc.basics.docstrings import documented
 from dmoc.exports.functions import Term
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
+from dmoc.parts.rows import title
 from dmoc.scene.problem import TransferProblem
 
-# Added to a number it leaves nothing of that number, and dividing by it loses no digit.
+# How a bound or parameter depends on a number is found by evaluating it at this value [in the number's SI
+# unit]: bounds and parameters are NumPy arrays, of which CasADi has no derivative. If b(x) = c + a x, then
+# b(2^100) is a 2^100 alone: next to a number so large, c is lost in rounding. Dividing by a power of two
+# changes no digit, so a is exact, while a difference of two values near each other would lose half of them.
 HUGE = 2.0**100
+# The slopes found at plus and minus `HUGE` may differ by this relative error [-]; more means not affine.
+AFFINE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -34,8 +39,8 @@ class Number:
 class Numbers:
     """The numbers of a problem that its NLP takes as bounds or parameters.
 
-    Bounds and parameters are affine in them, constant + matrix @ numbers, which one change of every number
-    shows. A number that enters in another way stays as the problem states it.
+    Bounds and parameters are affine in them, constant + matrix @ numbers; each column of the matrix is found
+    by changing one number. A number that enters in another way stays as the problem states it.
     """
 
     def __init__(self, nlp: NLP):
@@ -81,17 +86,19 @@ class Numbers:
 
     def _slope(self, number: Number, index: int) -> np.ndarray:
         """Derivative of bounds and parameters by one entry; NaN if they are not affine in it."""
+        # infinite bounds are no limits, whatever the number
         slopes, known = [], np.isfinite(self.base)
         for by in (HUGE, -HUGE):
             values = number.value.copy()
             values[index] += by
             taken = self._taken(number.changed(values))
-            # a special value, such as an eccentricity of 0, may have a parameter less than any other
+            # a special value may do without a parameter that all others have, such as an eccentricity of 0
+            # without the direction of the pericentre: such a number stays as it is
             if taken.shape != self.base.shape:
                 return np.full(self.base.shape, np.nan)
             slopes.append(np.where(known, taken - np.where(known, self.base, 0.0), 0.0) / by)
         up, down = slopes
-        return up if np.allclose(up, down, rtol=1e-12, atol=0.0) else np.full(self.base.shape, np.nan)
+        return up if np.allclose(up, down, rtol=AFFINE, atol=0.0) else np.full(self.base.shape, np.nan)
 
 
 def numbers_of(problem: TransferProblem) -> Iterator[Number]:
@@ -99,7 +106,7 @@ def numbers_of(problem: TransferProblem) -> Iterator[Number]:
     for owner in ("start", "goal", "actuator", "objective"):
         yield from _numbers_of_part(getattr(problem, owner), owner, partial(_with, problem, owner))
     for i, part in enumerate(problem.constraints):
-        owner = f"{_snake(type(part).__name__)}_{i + 1}"
+        owner = title(part, i)
         yield from _numbers_of_part(part, owner, partial(_with_constraint, problem, i))
     duration = ("durations", "shortest and longest duration") if problem.free_duration else ("duration",) * 2
     own = {"mass": ("mass", "mass at the start", "kg"), "start_time": ("start_time", "time at the start", "s")}
@@ -146,7 +153,3 @@ def _with(part: Any, field: str, value: Any) -> Any:
 def _with_constraint(problem: TransferProblem, place: int, part: Any) -> TransferProblem:
     parts = (*problem.constraints[:place], part, *problem.constraints[place + 1 :])
     return _with(problem, "constraints", parts)
-
-
-def _snake(name: str) -> str:
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

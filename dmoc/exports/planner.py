@@ -17,7 +17,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.motion.stability import refuse_unstable
 from dmoc.nlp.ipopt import Answer
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import check_mesh, transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
@@ -46,6 +46,7 @@ class Planner:
     @cached_property
     def multipliers(self) -> dict[str, np.ndarray]:
         """SI value of a scaled multiplier of 1, of every group, shape (components, count)."""
+        # the way from scaled to SI multipliers is linear: what it makes of ones are the factors themselves
         columns, rows = np.ones(self.nlp.columns.size), np.ones(self.nlp.rows.size)
         answer = Answer(columns, columns, rows, rows, 0.0, "", 0, 0, 0.0)
         return self.by_name(self.nlp.path(self.scene.problem, answer).multipliers)
@@ -57,7 +58,7 @@ class Planner:
 
     @property
     def plan_names(self) -> list[str]:
-        """What a plan consists of, beside multipliers."""
+        """The arguments that make up a plan, without its multipliers."""
         more = ["masses"] * self.scene.burns + ["duration"] * self.scene.problem.free_duration
         return ["positions", "velocities", "forces", *more]
 
@@ -112,7 +113,7 @@ def cost(planner: Planner) -> Exported:
         if name in path or whole.jac_sparsity(0, i).nnz()
     }
     values = [used[name] if name in used else planner.numbers.value(name) for name in given]
-    terms = planner.numbers.terms | {"cost": Term(_unit(planner), "the objective, in its own sign")}
+    terms = planner.numbers.terms | {"cost": Term(_objective_unit(planner), "the objective, in its own sign")}
     return Exported(named("cost", used, {"cost": whole(*values)}), "the objective of a path", terms)
 
 
@@ -128,6 +129,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
     x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
     found = nlp.solver(options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)
+    # how far unknowns and rows are beyond their bounds, all scaled
     both = ca.vertcat(found["x"], found["g"])
     beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
@@ -139,7 +141,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
 
 
 def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX]) -> dict[str, ca.MX]:
-    """What a solve gave, in SI units; the residual is found anew from the path."""
+    """The plan that a solve gave, in SI units; its residual is computed from the plan, not taken from Ipopt."""
     path = planner.unpack(found["x"], numbers)
     path["velocities"] = velocities_of(planner.scene, path)
     residual = residual_of(planner.scene, path)
@@ -178,17 +180,17 @@ def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
 
 
 def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
-    """The largest value, at least 0; infinite if what is to be finite is not: a maximum passes over NaN."""
+    """The largest value, at least 0; infinite if `finite` is not, for a maximum in CasADi passes over NaN."""
     return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 
 
-def _unit(planner: Planner) -> str:
+def _objective_unit(planner: Planner) -> str:
     problem = planner.scene.problem
     return problem.objective.unit_with(problem.actuator)
 
 
 def _solver_terms(planner: Planner) -> dict[str, Term]:
-    unit = _unit(planner)
+    unit = _objective_unit(planner)
     terms = {
         "objective": Term(unit, "the objective, in its own sign"),
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),

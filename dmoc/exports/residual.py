@@ -11,6 +11,7 @@ from dmoc.motion.momenta import legendre_function
 
 def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
     """P_0 .. P_s [m/s] of every step of a path, one column a step."""
+    # positions relative to the first one: far from the origin, their differences would lose digits
     h, origin = path["duration"] / scene.steps, path["positions"][:, 0]
     q = ca.vertcat(*scene.at_nodes(path["positions"] - ca.repmat(origin, 1, scene.nodes)))
     m = ca.vertcat(*scene.at_nodes(path["masses"])) if scene.burns else ca.MX(0, scene.steps)
@@ -20,7 +21,10 @@ def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
 
 
 def step_times(steps: int) -> ca.Function:
-    """(0, start time, h) -> times at the start of all steps, counted and not added up."""
+    """(0, start time, h) -> times at the start of all steps.
+
+    Each is start time + count h: added up step by step, the times would collect rounding errors.
+    """
     state = ca.MX.sym("state", 3)
     given = ca.vertcat(state[0] + 1, state[1:])
     return ca.Function("count", [state], [given, state[1] + state[0] * state[2]]).mapaccum("times", steps)
@@ -52,14 +56,17 @@ def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     finish = scene.momentum(start_time + duration, q[:, -1], path["goal_velocity"], last_mass)
     arriving = ca.horzcat(begin, parts[-1][:, :-1])
     weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
-    ends = _times(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
+    # at a node between two steps the force acts for the end of one and the beginning of the other, so its row
+    # is divided by twice the weight; at the start of the path it acts for one of them, hence the factor 2
+    ends = _scaled_rows(parts[0] + arriving, masses[0] / (2 * weight[0]), n)
     ends = ca.horzcat(2 * ends[:, 0], ends[:, 1:])
-    inner = [_times(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
+    inner = [_scaled_rows(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
     rows = ca.reshape(ca.vertcat(ends, *inner), n, scene.nodes - 1) if inner else ends
     return ca.horzcat(rows, (parts[-1][:, -1] - finish) * last_mass / weight[0])
 
 
-def _times(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
+def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
+    """Rows times a number, or times one number a column."""
     return rows * (factor if factor.is_scalar() else ca.repmat(factor, axes, 1))
 
 

@@ -17,7 +17,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 
 # Coasts are followed at this many places at most, paths compared at this many a revolution.
-MOST_SAMPLES, A_TURN = 100_000, 100
+MOST_SAMPLES, PLACES_A_TURN = 100_000, 100
 # More revolutions would need more memory than there is; as a rule a unit is wrong.
 MOST_TURNS = 10_000
 
@@ -35,7 +35,7 @@ def shortest_flyable(problem: TransferProblem, states: Callable[[float], Any], a
     the limit, in the mean square, or from three revolutions on as long as a spiral takes; `states` gives
     the states of both ends for a duration.
     """
-    longest, sample = problem.duration_bounds[1], np.linspace(0.0, 1.0, A_TURN * (2 + MANY_TURNS))
+    longest, sample = problem.duration_bounds[1], np.linspace(0.0, 1.0, PLACES_A_TURN * (2 + MANY_TURNS))
     for duration in np.geomspace(*problem.duration_bounds, DURATIONS):
         ends = states(duration)
         if _turn_rate(problem, ends) * duration > MANY_TURNS:
@@ -84,7 +84,9 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
         paths.append((_coasts(problem, duration, states), False))
     best = paths[0]
     if len(paths) > 1:
-        sample = np.linspace(0.0, 1.0, A_TURN * (2 + max((turns for _, turns, _ in windings), default=0)))
+        sample = np.linspace(
+            0.0, 1.0, PLACES_A_TURN * (2 + max((turns for _, turns, _ in windings), default=0))
+        )
         best = min(paths, key=lambda path: _needed(problem, path[0](sample), duration * sample, states))
     return best[0](fractions), best[1]
 

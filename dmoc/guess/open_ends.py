@@ -150,12 +150,12 @@ def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarra
     q, v = state
     center = problem.attraction.center
     q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
-    up, across = (unit @ v for unit in (_unit(q), _unit(np.cross(np.cross(q, v), q))))
-    turned = up * _unit(to) + across * _unit(np.cross(np.cross(q, v), to))
+    up, across = (unit @ v for unit in (_direction(q), _direction(np.cross(np.cross(q, v), q))))
+    turned = up * _direction(to) + across * _direction(np.cross(np.cross(q, v), to))
     return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]
 
 
-def _unit(x: np.ndarray) -> np.ndarray:
+def _direction(x: np.ndarray) -> np.ndarray:
     return x / (np.linalg.norm(x) or 1.0)
 
 

@@ -89,7 +89,7 @@ def simulate(
         raise ValueError(f"simulate needs a start without free entries; got {problem.start.words()}")
     path = getattr(controls, "path", None)
     if path is None:
-        path = _given_path(problem, controls, steps, order, hold, duration)
+        path = _path_at_start(problem, controls, steps, order, hold, duration)
     elif path.position.shape[1:] + path.control.shape[1:] != (
         dynamics.positions,
         dynamics.controls,
@@ -105,7 +105,7 @@ def simulate(
     return Trajectory(time, q, v, p, mass, energy)
 
 
-def _given_path(
+def _path_at_start(
     problem: TransferProblem, controls: Any, steps: int | None, order: int, hold: bool, duration: float | None
 ) -> DiscretePath:
     """Controls on a mesh, checked, as a path that stays at the start."""

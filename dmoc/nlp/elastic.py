@@ -9,13 +9,15 @@ import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.program import NLP
+from dmoc.nlp.ipopt import ALWAYS
+from dmoc.nlp.solving import NLP
 from dmoc.scene.problem import TransferProblem
 
-# The effort's weight beside the slack: it makes the path unique, and moves the slack by about as much.
+# The weight of the effort beside the slack: it makes the path unique, and moves the slack by about as much.
 EFFORT_SHARE = 1e-4
+# A run that takes more iterations than this is given up: the others took fewer than 100.
 MOST_ITERATIONS = 200
-# Rows of a path that meets them, scaled.
+# A row is met if its scaled violation is below this.
 MET = 1e-7
 WARM = {
     "ipopt.warm_start_init_point": "yes",
@@ -83,7 +85,7 @@ class Relaxation:
         jacobian = ca.vertcat(ca.horzcat(parts.jacobian(x, p)[1], elastic), ca.horzcat(pick, share))
         weight, multipliers = ca.MX.sym("weight"), ca.MX.sym("multipliers", g.numel())
         hessian = parts.hessian(x, p, EFFORT_SHARE * weight, multipliers[:rows])
-        settings = {
+        settings = ALWAYS | {
             "jac_g": ca.Function(
                 "nlp_jac_g", [z, p], [ca.MX(*g.shape), jacobian], ["x", "p"], ["g", "jac_g_x"]
             ),
@@ -95,14 +97,6 @@ class Relaxation:
                 ["x", "p", "lam_f", "lam_g"],
                 ["h"],
             ),
-            "no_nlp_grad": True,
-            "calc_lam_p": False,
-            "print_time": False,
-            "error_on_fail": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
-            "ipopt.linear_solver": "mumps",
-            "ipopt.nlp_scaling_method": "none",
             "ipopt.mumps_permuting_scaling": 0,
             "ipopt.acceptable_iter": 0,
             "ipopt.max_iter": MOST_ITERATIONS,

@@ -2,39 +2,27 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import of_kind
-from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
-from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights
-from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
-from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
+from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.layout import Group, Layout
-from dmoc.nlp.settings import settings_for
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
-from dmoc.results.facts import Level, Provenance
-from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-
-# (order, steps, iteration, objective, name of the worst row, its scaled violation) -> whether to stop
-Progress = Callable[[int, int, int, float, str, float], bool | None]
 
 
 @dataclass(frozen=True)
-class NLP:
-    """One transfer problem on one mesh, as Ipopt sees it.
+class Program:
+    """Unknowns, rows, bounds and parameters of one transfer problem on one mesh, scaled.
 
     Start, goal, mass, limits and times are bounds and parameters: `bounds(problem)` and
     `parameters(problem)` give them for any problem that `accepts` lets through, without a rebuild.
@@ -201,109 +189,6 @@ class NLP:
         return [
             (layout.group_at(at), at, float(both[i])) for i, (layout, at) in zip(worst, places, strict=True)
         ]
-
-    def solver(
-        self,
-        options: dict[str, Any] | None = None,
-        warm: bool = False,
-        carried: bool = False,
-        watch: Watch | None = None,
-    ) -> ca.Function:
-        """Ipopt for this NLP; `warm` and `carried` as in `settings_for`."""
-        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried)
-        return make_solver(self.assembly, settings, options, watch)
-
-    def watch(self, problem: TransferProblem, progress: Progress | None, interrupt: Interrupt) -> Watch:
-        """A watch over the iterations that tells `progress` of each in the problem's own words."""
-
-        def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
-            worst = self.violations(problem, x, g, count=1)
-            name, size = (worst[0][0].name_of(worst[0][1]), worst[0][2]) if worst else ("", 0.0)
-            steps = len(self.mesh) - 1
-            return bool(progress(self.scheme.order, steps, iteration, self.objective(objective), name, size))  # type: ignore[misc]
-
-        sizes = self.columns.size, self.rows.size, self.assembly.p.numel()
-        return Watch(*sizes, tell if progress else None, interrupt)
-
-    def run(self, solver: ca.Function, problem: TransferProblem, path: DiscretePath) -> Answer:
-        """Solve for a problem that `accepts` lets through, from a path on this mesh."""
-        lbx, ubx, lbg, ubg = self.bounds(problem)
-        lam_x, lam_g = self.multipliers(path)
-        bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
-        x0 = np.clip(self.pack(path), lbx, ubx)
-        return run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
-
-    def level(self, answer: Answer, build_s: float) -> Level:
-        """What one run took, for the ladder."""
-        return Level(
-            order=self.scheme.order,
-            steps=len(self.mesh) - 1,
-            iterations=answer.iterations,
-            objective=self.objective(answer.objective),
-            build_s=build_s,
-            solve_s=answer.seconds,
-            status=answer.status,
-            evaluations=answer.evaluations,
-        )
-
-    def solution(
-        self,
-        problem: TransferProblem,
-        answer: Answer,
-        ladder: tuple[Level, ...],
-        message: str,
-        options: dict[str, Any] | None = None,
-        **found: Any,
-    ) -> Solution:
-        """An answer as a Solution; `found` are further fields of it."""
-        path = self.path(problem, answer)
-        momentum, velocity = end_momenta(self.dynamics, path, problem.start_time)
-        return Solution(
-            problem=problem,
-            path=path,
-            velocity=velocity,
-            momentum=momentum,
-            force=force_of(self.dynamics, path.control),
-            objective=self.objective(answer.objective),
-            success=answer.status == "solved",
-            status=answer.status,
-            message=message,
-            ladder=ladder,
-            provenance=Provenance.of(problem, options),
-            **found,
-        )
-
-    def solve(
-        self, problem: TransferProblem | None = None, guess: Any = None, options: dict[str, Any] | None = None
-    ) -> Solution:
-        """Solve again without a rebuild, for a problem that differs in states, mass, limits or times.
-
-        One run of Ipopt on this mesh, for closed loops and families of problems; `dmoc.solve` goes from
-        coarse to fine and says why there is no path.
-
-        Parameters
-        ----------
-        problem : TransferProblem
-            One that this NLP `accepts`; its own if not given.
-        guess
-            As in `dmoc.solve`; a former Solution on the same mesh starts warm, with its multipliers.
-        options : dict
-            CasADi `nlpsol` options.
-
-        Raises
-        ------
-        ValueError
-            By name, if the problem differs in more than that.
-        """
-        new = self.problem if problem is None else of_kind("problem", problem, TransferProblem)
-        self.accepts(new)
-        begun = time.perf_counter()
-        path = starting_guess(new, self.mesh, self.scheme.order, self.hold, guess)
-        solver = self.solver(options, warm=bool(path.multipliers))
-        built = time.perf_counter() - begun
-        answer = self.run(solver, new, path)
-        words = "a local optimum" if answer.status == "solved" else STATUSES[answer.status].advice
-        return self.solution(new, answer, (self.level(answer, built),), words, options)
 
 
 def _built_alike(new: Any, old: Any) -> bool:

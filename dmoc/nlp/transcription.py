@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import entries, flag, number, of_kind, short, whole
+from dmoc.basics.memory import Shelf
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -16,16 +16,16 @@ from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import assemble
 from dmoc.nlp.placement import Placement
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
 from dmoc.nlp.stencils import Stencils, stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
 
 # This many NLPs are held for problems of the same structure, mesh and units ...
 MOST_HELD = 16
-# ... if they have no more unknowns than this: then all of them take less than 100 MB.
-MOST_UNKNOWNS = 10_000
-_LAST: OrderedDict[tuple, tuple[Stencils, NLP]] = OrderedDict()
+# ... if they have no more nodes than this: then all of them together take less than 100 MB.
+MOST_HELD_NODES = 2000
+_NLPS = Shelf(MOST_HELD)
 
 
 def transcribe(
@@ -72,18 +72,16 @@ def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units,
         guess.mesh.tobytes(),
         np.concatenate([*astuple(units)[:-1], units.origin], axis=None).tobytes(),
     )
-    key = (id(stencils), mesh, sizes, guess.hold, compiled)
     dynamics = Dynamics.of(problem)
-    if key in _LAST:
-        _LAST.move_to_end(key)
-        return replace(_LAST[key][1], problem=problem, dynamics=dynamics)
-    nlp = _transcribed(problem, stencils, guess, units, compiled, dynamics)
-    if nlp.columns.size <= MOST_UNKNOWNS:
-        # The stencils are held with it: the identity of an object that is gone may come again.
-        _LAST[key] = (stencils, nlp)
-        while len(_LAST) > MOST_HELD:
-            _LAST.popitem(last=False)
-    return nlp
+    key = (id(stencils), mesh, sizes, guess.hold, compiled)
+
+    def make() -> tuple[Stencils, NLP]:
+        # The stencils are held with the NLP: the identity of an object that is gone may come again.
+        return stencils, _transcribed(problem, stencils, guess, units, compiled, dynamics)
+
+    small = len(guess.position) <= MOST_HELD_NODES
+    _, nlp = _NLPS.get(key, make) if small else make()
+    return replace(nlp, problem=problem, dynamics=dynamics)
 
 
 def _transcribed(

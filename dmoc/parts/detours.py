@@ -9,7 +9,7 @@ import numpy as np
 # A path that passes the centre within this part of the radius is pushed aside.
 CENTRAL = 0.05
 # It is pushed by this part of the radius: enough for the optimiser to see which side is nearer.
-PUSH = 0.3
+PUSHED = 0.3
 # A detour passes the centre at this many radii.
 CLEARANCE = 1.5
 
@@ -33,7 +33,7 @@ def off_centre(path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radi
         aside = np.zeros_like(along)
         aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
     near = np.maximum(0.0, 1 - (distance / (2 * radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
-    push = PUSH * radius * near / max(near[node], 1e-3)
+    push = PUSHED * radius * near / max(near[node], 1e-3)
     return path + push[:, None] * aside / np.linalg.norm(aside)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, entries, limits, number, short, times_each, vector
+from dmoc.basics.arguments import Vector, checked, entries, limits, number, short, times_each, vector
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
 
@@ -47,12 +47,11 @@ class _Burner(Actuator):
             raise ValueError(f"{name}: give specific_impulse [s] or exhaust_velocity [m/s], not both")
         if specific_impulse is not None:
             seconds = number("specific_impulse", specific_impulse, "s", positive=True)
-            object.__setattr__(self, "exhaust_velocity", seconds * STANDARD_GRAVITY)
-            object.__setattr__(self, "specific_impulse", None)
+            checked(self, exhaust_velocity=seconds * STANDARD_GRAVITY, specific_impulse=None)
         elif self.exhaust_velocity is not None:
             speed = number("exhaust_velocity", self.exhaust_velocity, "m/s", positive=True)
-            object.__setattr__(self, "exhaust_velocity", speed)
-        object.__setattr__(self, "dry_mass", number("dry_mass", self.dry_mass, "kg", nonnegative=True))
+            checked(self, exhaust_velocity=speed)
+        checked(self, dry_mass=number("dry_mass", self.dry_mass, "kg", nonnegative=True))
 
     def _burning_words(self) -> str:
         if not self.burns:
@@ -97,16 +96,19 @@ class Engine(_Burner):
     smoothing: float = 1e-5
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "max_thrust", number("max_thrust", self.max_thrust, "N", positive=True))
-        object.__setattr__(self, "min_thrust", number("min_thrust", self.min_thrust, "N", nonnegative=True))
+        checked(
+            self,
+            max_thrust=number("max_thrust", self.max_thrust, "N", positive=True),
+            min_thrust=number("min_thrust", self.min_thrust, "N", nonnegative=True),
+        )
         if self.min_thrust >= self.max_thrust:
             raise ValueError(
                 "Engine: min_thrust must be less than max_thrust; "
                 f"got {self.min_thrust:g} and {self.max_thrust:g} N"
             )
-        object.__setattr__(self, "smoothing", number("smoothing", self.smoothing, "-", positive=True))
+        checked(self, smoothing=number("smoothing", self.smoothing, "-", positive=True))
         if self.box is not None:
-            object.__setattr__(self, "box", limits("box", self.box, "N"))
+            checked(self, box=limits("box", self.box, "N"))
         self._check_exhaust(self.specific_impulse)
 
     @property
@@ -181,7 +183,7 @@ class Nozzles(_Burner):
                 f"Nozzles: directions must be nonzero rows of one length; got {short(self.directions)}"
             )
         unit = tuple(tuple(float(x) for x in np.array(row) / np.linalg.norm(row)) for row in rows)
-        object.__setattr__(self, "directions", unit)
+        checked(self, directions=unit)
         given = entries(self.max_thrust)
         thrusts = (self.max_thrust,) * len(rows) if given is None else given
         if len(thrusts) != len(rows):
@@ -189,8 +191,8 @@ class Nozzles(_Burner):
                 f"Nozzles: max_thrust has {len(thrusts)} entries but there are {len(rows)} directions; "
                 f"give one number [N] or {len(rows)}"
             )
-        checked = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
-        object.__setattr__(self, "max_thrust", checked)
+        limits = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
+        checked(self, max_thrust=limits)
         self._check_exhaust(self.specific_impulse)
 
     @property

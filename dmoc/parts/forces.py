@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, limits, times_each
+from dmoc.basics.arguments import Vector, checked, limits, times_each
 from dmoc.basics.digits import up
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.engines import Engine
@@ -33,7 +33,7 @@ class BoxForce(Actuator):
     limit: float | Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", limits("limit", self.limit, "N"))
+        checked(self, limit=limits("limit", self.limit, "N"))
 
     def check_dimension(self, dimension: int) -> None:
         if isinstance(self.limit, tuple) and len(self.limit) != dimension:
@@ -93,7 +93,7 @@ class BallForce(Actuator):
             raise ValueError(
                 f"BallForce: limit must be one number [N], the radius of the ball; got {self.limit!r}"
             )
-        object.__setattr__(self, "limit", value)
+        checked(self, limit=value)
 
     def rows(self, u: Any) -> list[Row]:
         return [Row("magnitude", ca.dot(u, u) / self.limit**2, -np.inf, 1.0)]

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from dmoc.basics.arguments import Vector, entries, number, short, vector, whole
+from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
 from dmoc.parts.actuator import Actuator
 
 
@@ -147,7 +147,7 @@ class FinalRadius(Objective):
 
     def __post_init__(self) -> None:
         if self.center is not None:
-            object.__setattr__(self, "center", vector("center", self.center, "m"))
+            checked(self, center=vector("center", self.center, "m"))
 
     def check_dimension(self, dimension: int) -> None:
         if self.center is not None and len(self.center) != dimension:
@@ -175,7 +175,7 @@ class FinalHeight(Objective):
     sense: ClassVar[int] = -1
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", whole("FinalHeight: axis", self.axis, least=-3))
+        checked(self, axis=whole("FinalHeight: axis", self.axis, least=-3))
 
     def check_dimension(self, dimension: int) -> None:
         if self.axis not in range(-dimension, dimension):
@@ -203,7 +203,7 @@ class WeightedSum(Objective):
         if not pairs or any(len(pair) != 2 or not isinstance(pair[1], Objective) for pair in pairs):
             raise ValueError(f"WeightedSum: parts must be pairs (weight, objective); got {short(self.parts)}")
         parts = tuple((number("weight", weight, ""), term) for weight, term in pairs)
-        object.__setattr__(self, "parts", parts)
+        checked(self, parts=parts)
         pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
         if len(pulls) > 1:
             raise ValueError(

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import number
+from dmoc.basics.arguments import checked, number
 from dmoc.basics.digits import up
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.rows import Row
@@ -29,7 +29,7 @@ class SpeedLimit(Constraint):
     adjustable: ClassVar[tuple[str, ...]] = ("limit",)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "limit", number("limit", self.limit, "m/s", positive=True))
+        checked(self, limit=number("limit", self.limit, "m/s", positive=True))
 
     def speed_rows(self, v: Any) -> list[Row]:
         return [Row("speed", ca.dot(v, v) / self.limit**2, -np.inf, 1.0)]

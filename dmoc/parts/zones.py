@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, entries, number, same_length, short, vector
+from dmoc.basics.arguments import Vector, checked, entries, matching_length, number, same_length, short, vector
 from dmoc.basics.digits import down
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import off_centre, ways_round
@@ -34,11 +34,14 @@ class KeepOut(Constraint):
     adjustable: ClassVar[tuple[str, ...]] = ("center", "radius")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", vector("center", self.center, "m"))
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
+        checked(
+            self,
+            center=vector("center", self.center, "m"),
+            radius=number("radius", self.radius, "m", positive=True),
+        )
 
     def check_dimension(self, dimension: int) -> None:
-        _need(self, "center", len(self.center), dimension)
+        matching_length(self, "center", len(self.center), dimension)
 
     def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
         offset = (q - self.center) / self.radius
@@ -48,7 +51,7 @@ class KeepOut(Constraint):
         return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
 
     def words(self) -> str:
-        return f"stays {self.radius:g} m away from {_point(self.center)}"
+        return f"stays {self.radius:g} m away from {_place(self.center)}"
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
@@ -96,7 +99,7 @@ class KeepIn(Constraint):
             }
             finite = vector(name, [0.0 if i in endless else x for i, x in enumerate(given)], "m")
             corner = (float(given[i] if i in endless else x) for i, x in enumerate(finite))
-            object.__setattr__(self, name, tuple(corner))
+            checked(self, **{name: tuple(corner)})
         same_length("KeepIn", lower=self.lower, upper=self.upper)
         for low, high in zip(self.lower, self.upper, strict=True):
             if low >= high:
@@ -105,7 +108,7 @@ class KeepIn(Constraint):
                 )
 
     def check_dimension(self, dimension: int) -> None:
-        _need(self, "lower", len(self.lower), dimension)
+        matching_length(self, "lower", len(self.lower), dimension)
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.lower), np.array(self.upper)
@@ -114,7 +117,7 @@ class KeepIn(Constraint):
         return np.maximum(0.0, np.maximum(self.lower - q, q - self.upper)).max(axis=1)
 
     def words(self) -> str:
-        return f"stays between {_point(self.lower)} and {_point(self.upper)}"
+        return f"stays between {_place(self.lower)} and {_place(self.upper)}"
 
     def outline(self) -> tuple[Shape, ...]:
         return (Box(np.array(self.lower), np.array(self.upper)),)
@@ -156,13 +159,16 @@ class ApproachCone(Constraint):
         half_angle = number("half_angle", self.half_angle, "rad", positive=True)
         if half_angle >= np.pi / 2:
             raise ValueError(f"ApproachCone: half_angle must be less than pi/2 rad; got {half_angle:g}")
-        object.__setattr__(self, "apex", apex)
-        object.__setattr__(self, "axis", tuple(x / length for x in axis))
-        object.__setattr__(self, "half_angle", half_angle)
-        object.__setattr__(self, "rounding", number("rounding", self.rounding, "m", positive=True))
+        checked(
+            self,
+            apex=apex,
+            axis=tuple(x / length for x in axis),
+            half_angle=half_angle,
+            rounding=number("rounding", self.rounding, "m", positive=True),
+        )
 
     def check_dimension(self, dimension: int) -> None:
-        _need(self, "apex", len(self.apex), dimension)
+        matching_length(self, "apex", len(self.apex), dimension)
 
     def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
         offset = q - self.apex
@@ -184,21 +190,13 @@ class ApproachCone(Constraint):
 
     def words(self) -> str:
         angle, axis = np.degrees(self.half_angle), _numbers(self.axis)
-        return f"stays in the cone of half angle {angle:g} degrees from {_point(self.apex)} along {axis}"
+        return f"stays in the cone of half angle {angle:g} degrees from {_place(self.apex)} along {axis}"
 
     def outline(self) -> tuple[Shape, ...]:
         return (Cone(np.array(self.apex), np.array(self.axis), self.half_angle),)
 
 
-def _need(part: Any, argument: str, given: int, dimension: int) -> None:
-    if given != dimension:
-        raise ValueError(
-            f"{type(part).__name__}: {argument} has {given} entries but the problem has {dimension} "
-            f"dimensions; give {dimension}"
-        )
-
-
-def _point(values: Vector) -> str:
+def _place(values: Vector) -> str:
     return f"{_numbers(values)} m"
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 SUPERSCRIPTS = {"^2": "\u00b2", "^3": "\u00b3"}
 # A wider range than this is drawn on a logarithmic scale.
-WIDE = 30.0
+WIDE_SPAN = 30.0
 FRONT: dict[str, Any] = {
     "color": PUSH,
     "marker": "o",
@@ -94,7 +94,7 @@ def along(axis: Any, data: Dataset, name: Any) -> np.ndarray:
 
 def wide(values: np.ndarray) -> bool:
     known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0 and known.max() > WIDE * known.min())
+    return bool(known.size and known.min() > 0 and known.max() > WIDE_SPAN * known.min())
 
 
 def unit_of(array: DataArray) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.basics.files import path_of, whole_file
+from dmoc.basics.files import as_path, whole_file
 from dmoc.parts.objectives import Objective
 from dmoc.plots.ledger import draw_ledger
 from dmoc.plots.path import burning, draw_path, entries_once, is_wide
@@ -60,7 +60,7 @@ def save_figure(
         If the suffix is another one or the folder does not exist.
     """
     of_kind("solution", solution, Solution)
-    if path_of(path).suffix.lower() not in SUFFIXES:
+    if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     page = figure(solution, report)
     with whole_file(path) as temporary:

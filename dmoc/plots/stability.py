@@ -10,19 +10,19 @@ import numpy as np
 from dmoc.plots.study import COLOURS, DASHES, MARKERS, plain_numbers
 from dmoc.plots.style import DARK, PALE, SETTINGS, WARNING
 from dmoc.studies.drift import Drift
-from dmoc.studies.rounding import FORMS, Growth, RoundOff
+from dmoc.studies.rounding import FORMS, Amplification, RoundOff
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 OTHERS = {"RK4": "#222222", "DOP853": "#808080", "DOP853, adaptive": "#CC79A7"}
 EPS = float(np.finfo(float).eps)
-# Growth a step up to which the edges of stability are drawn.
+# Amplification a step up to which the edges of stability are drawn.
 HIGHEST = 1.6
 
 
 def stability_figure(
-    runs: Sequence[tuple[str, Sequence[Drift]]], rounding: Sequence[RoundOff], edges: Sequence[Growth]
+    runs: Sequence[tuple[str, Sequence[Drift]]], rounding: Sequence[RoundOff], edges: Sequence[Amplification]
 ) -> Figure:
     """A matplotlib Figure: errors over revolutions and against time, rounding, growth beyond the limits.
 
@@ -95,7 +95,7 @@ def _draw_rounding(axes: Any, rounding: Sequence[RoundOff]) -> None:
     axes.set_xlabel("steps")
 
 
-def _draw_growth(axes: Any, edges: Sequence[Growth]) -> None:
+def _draw_growth(axes: Any, edges: Sequence[Amplification]) -> None:
     for row in edges:
         axes.plot(row.reach, row.growth, **_style(row.method))
     limits = [(row.method, row.gaps[0][0]) for row in edges if row.method in COLOURS]
@@ -107,5 +107,5 @@ def _draw_growth(axes: Any, edges: Sequence[Growth]) -> None:
         axes.annotate(words, (0.98, 0.24 - 0.06 * i), color=COLOURS[method], **place)
     axes.set_ylim(0.3, HIGHEST)
     axes.set_xlim(0.0, float(edges[0].reach[-1]))
-    axes.set_title("Growth of an oscillation in one step")
+    axes.set_title("Amplification of an oscillation in one step")
     axes.set_xlabel("h \u00d7 rate of the oscillation")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.basics.files import path_of, whole_file
+from dmoc.basics.files import as_path, whole_file
 from dmoc.plots.page import SUFFIXES
 from dmoc.plots.style import DARK, SETTINGS
 from dmoc.studies.accuracy import COLD, COMPILED, Trial
@@ -48,7 +48,7 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
 
 def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150) -> None:
     """Write a figure into a .png, .pdf or .svg file, whole or not at all; ValueError if it cannot be."""
-    if path_of(path).suffix.lower() not in SUFFIXES:
+    if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)
@@ -89,7 +89,7 @@ def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple
     ends = []
     for name, points in curves.items():
         x, y = np.array(points).T
-        style = _style(name, others)
+        style = _curve_style(name, others)
         axes.plot(x, np.maximum(y, 1e-16), label=name, markersize=6, **style)
         ends.append((x[-1], max(y[-1], 1e-16), name, style["color"]))
     plain_numbers(axes.xaxis)
@@ -106,7 +106,7 @@ def plain_numbers(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _style(name: str, others: list[str]) -> dict[str, Any]:
+def _curve_style(name: str, others: list[str]) -> dict[str, Any]:
     if name in others:
         i = others.index(name)
         return {

@@ -42,12 +42,12 @@ def save_sweep(data: Dataset, path: str | os.PathLike) -> None:
     path : path
         Ends in .png, .pdf or .svg, which decides the format.
     """
-    page = figure(data)
+    page = sweep_figure(data)
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=150)
 
 
-def figure(data: Dataset) -> Figure:
+def sweep_figure(data: Dataset) -> Figure:
     """A matplotlib Figure of a sweep.
 
     One parameter: a curve. Two: a map with contours, what failed hatched. More: the best over the
@@ -77,8 +77,8 @@ def figure(data: Dataset) -> Figure:
             _draw_map(panels[0], data)
         if front and not alone:
             draw_front(panels[1], data, front)
-        page.suptitle(_headline(data), fontsize=16, color=DARK)
-        words, good = _footnote(data)
+        page.suptitle(_sweep_headline(data), fontsize=16, color=DARK)
+        words, good = _sweep_footnote(data)
         page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
     return page
 
@@ -213,14 +213,14 @@ def _title(objective: DataArray) -> str:
     return f"{'Least' if objective.attrs.get('sense', 1) > 0 else 'Greatest'} {_kind(objective)}"
 
 
-def _headline(data: Dataset) -> str:
+def _sweep_headline(data: Dataset) -> str:
     fixed = ", ".join(f"{name} {value}" for name, value in json.loads(data.attrs["settings"]).items())
     varied = ", ".join(str(name).replace("_", " ") for name in data.coords)
     name = str(data.attrs["problem"]).replace("_", " ")
     return f"{name} over {varied}" + (f" ({fixed})" if fixed else "")
 
 
-def _footnote(data: Dataset) -> tuple[str, bool]:
+def _sweep_footnote(data: Dataset) -> tuple[str, bool]:
     """How many points there are and what became of them, and whether all is well."""
     success, held = result(data, "success").values, result(data, "checks_hold").values
     solved, broken = int(success.sum()), int((success & ~held).sum())

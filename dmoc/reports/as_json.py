@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import TYPE_CHECKING, Any
+
+from dmoc.basics.plain import finite
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
 
 
-def result(solution: Solution, report: Report | None) -> dict[str, Any]:
-    """The JSON object of a solve; numbers that are not finite become null."""
+def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
+    """The JSON object of a solve."""
     listed = report.checks if report else ()
     return {
         "problem": solution.require_problem().name,
         "success": bool(solution.success),
         "status": solution.status,
-        "objective": _finite(solution.objective),
-        "duration": _finite(solution.duration),
-        "final_mass": _finite(solution.final_mass),
+        "objective": float(solution.objective),
+        "duration": float(solution.duration),
+        "final_mass": float(solution.final_mass),
         "order": int(solution.order),
         "steps": int(solution.steps),
         "nodes": len(solution.position),
         "iterations": int(solution.iterations),
-        "build_s": _finite(solution.build_s),
-        "solve_s": _finite(solution.solve_s),
-        "verify_s": _finite(report.seconds if report else 0.0),
+        "build_s": float(solution.build_s),
+        "solve_s": float(solution.solve_s),
+        "verify_s": float(report.seconds if report else 0.0),
         "checks": {
             check.name: {
-                "value": _finite(check.value),
-                "limit": _finite(check.limit),
+                "value": _float(check.value),
+                "limit": _float(check.limit),
                 "unit": check.unit,
                 "ok": bool(check.ok),
             }
@@ -41,9 +42,9 @@ def result(solution: Solution, report: Report | None) -> dict[str, Any]:
 
 
 def as_text(value: dict[str, Any]) -> str:
-    """One object, valid JSON even where a number was not finite."""
-    return json.dumps(value, indent=2, allow_nan=False)
+    """One object as JSON, where numbers that are not finite become null."""
+    return json.dumps(finite(value), indent=2, allow_nan=False)
 
 
-def _finite(value: Any) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
+def _float(value: Any) -> float | None:
+    return None if value is None else float(value)

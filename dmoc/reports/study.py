@@ -14,14 +14,16 @@ from rich.table import Table
 from rich.text import Text
 
 from dmoc.basics.files import whole_file
+from dmoc.reports.words import plain_table
 from dmoc.studies.accuracy import TARGETS, Trial, time_to_reach
 
+# Columns of the table of solves that have no value where a solve failed.
 FIGURES = ("error", "goal missed", "iterations", "calls", "build", "solve")
-# Terminals narrower than this get a table without nodes and calls.
-WIDE = 92
+# Terminals narrower than this [letters] get a table without nodes and calls: with them it would not fit.
+FULL_WIDTH = 92
 
 
-def study_tables(trials: Sequence[Trial], unit: str, width: int = WIDE) -> RenderableType:
+def study_tables(trials: Sequence[Trial], unit: str, width: int = FULL_WIDTH) -> RenderableType:
     """Every solve, then the time to reach each accuracy."""
     solves = Text("Solves: relative errors, medians of the times", "bold")
     reach = Text("Milliseconds to a relative error of the objective (build and solve)", "bold")
@@ -30,16 +32,12 @@ def study_tables(trials: Sequence[Trial], unit: str, width: int = WIDE) -> Rende
 
 
 def study_object(name: str, trials: Sequence[Trial]) -> dict[str, Any]:
-    """The JSON object of a study; numbers that are not finite become null."""
-    rows = [
-        {key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in row}
-        for row in (asdict(trial).items() for trial in trials)
-    ]
+    """The JSON object of a study."""
     reach = [
         {"method": method, "seconds": dict(zip(map(_power, TARGETS), seconds, strict=True))}
         for method, seconds in time_to_reach(trials).items()
     ]
-    return {"problem": name, "trials": rows, "time_to_reach": reach}
+    return {"problem": name, "trials": [asdict(trial) for trial in trials], "time_to_reach": reach}
 
 
 def write_csv(trials: Sequence[Trial], path: Path) -> None:
@@ -52,10 +50,10 @@ def write_csv(trials: Sequence[Trial], path: Path) -> None:
 
 def _solves(trials: Sequence[Trial], unit: str, width: int) -> Table:
     rows = [_cells(trial) for trial in trials]
-    names = [name for name in rows[0] if width >= WIDE or name not in ("nodes", "calls")] if rows else []
+    names = [name for name in rows[0] if width >= FULL_WIDTH or name not in ("nodes", "calls")] if rows else []
     units = {"objective": unit, "build": "ms", "solve": "ms"}
     heads = [name.replace(" ", "\n") + (f"\n[{units[name]}]" if name in units else "") for name in names]
-    table = _table(heads)
+    table = plain_table(heads, numbers=slice(1, None), unbroken=slice(None), gap=1)
     before = ""
     for row in rows:
         shown = row | {"method": "" if row["method"] == before else row["method"]}
@@ -81,7 +79,7 @@ def _cells(trial: Trial) -> dict[str, str]:
 
 
 def _reach(trials: Sequence[Trial]) -> Table:
-    table = _table(["method", *map(_power, TARGETS)])
+    table = plain_table(["method", *map(_power, TARGETS)], numbers=slice(1, None), unbroken=slice(None), gap=1)
     for method, times in time_to_reach(trials).items():
         table.add_row(method, *["-" if seconds is None else f"{1e3 * seconds:.3g}" for seconds in times])
     return table
@@ -90,10 +88,3 @@ def _reach(trials: Sequence[Trial]) -> Table:
 def _power(target: float) -> str:
     """1e-03 as 1e-3."""
     return f"1e{round(math.log10(target))}"
-
-
-def _table(columns: Sequence[str]) -> Table:
-    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i else "left", no_wrap=True)
-    return table

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.effects.base import Effect
     from dmoc.motion.march import Trajectory
-    from dmoc.nlp.program import NLP
+    from dmoc.nlp.solving import NLP
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
     from dmoc.scene.problem_file import Parameter
 
-# Width of what is written to a file or a pipe, where no terminal gives one.
+# What is written to a file or a pipe has lines of at most this many letters: no terminal gives a width there.
 PLAIN_WIDTH = 120
-# The live line is redrawn at most this often [s]: drawing must not slow the solve down.
+# The live line is drawn again after this time at the earliest [s]: drawing must not slow the solve down.
 REDRAW = 0.1
 
 
@@ -94,7 +94,7 @@ def value_words(value: Any, unit: str = "") -> str:
 
 def parameters(entries: Sequence[Parameter]) -> RenderableType:
     """The parameters of a problem file with defaults and units."""
-    table = _table("parameter", "default", "unit", "what it is")
+    table = plain_table(["parameter", "default", "unit", "what it is"])
     for entry in entries:
         default = value_words(entry.default) if not isinstance(entry.default, str) else repr(entry.default)
         table.add_row(entry.name, default, entry.unit, entry.description)
@@ -113,7 +113,9 @@ def sizes(nlp: NLP) -> RenderableType:
 def ladder(solution: Solution) -> RenderableType:
     """The meshes on the way, coarse to fine."""
     objective = f"objective [{solution.provenance.objective_unit}]"
-    table = _table("order", "steps", "iterations", objective, "build [s]", "solve [s]", "status", right=6)
+    table = plain_table(
+        ["order", "steps", "iterations", objective, "build [s]", "solve [s]", "status"], numbers=slice(6)
+    )
     estimated = any(level.error is not None for level in solution.ladder)
     if estimated:
         table.add_column("error [-]")
@@ -122,7 +124,7 @@ def ladder(solution: Solution) -> RenderableType:
         row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
         error = "" if level.error is None else f"{level.error:.1e}"
         table.add_row(*row, level.status, *([error] if estimated else []))
-    # on a narrow terminal headers break, not numbers
+    # on a narrow terminal the headers are broken into lines, not the numbers
     for column in table.columns:
         column.min_width = max((len(str(cell)) for cell in column.cells), default=0)
     return table
@@ -130,7 +132,7 @@ def ladder(solution: Solution) -> RenderableType:
 
 def checks(report: Report) -> RenderableType:
     """The checks, one line each."""
-    table = _table("check", "value", "limit", "unit", "verdict", "note")
+    table = plain_table(["check", "value", "limit", "unit", "verdict", "note"])
     for check in report.checks:
         if check.value is None:
             verdict = Text("does not apply", "dim")
@@ -153,7 +155,7 @@ def answer(
     if quiet:
         return last
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
-    return Group(*_meshes(solution), *_accuracy(solution), Text(), *verdicts, *_files(written), last)
+    return Group(*_ladder_lines(solution), *_estimate(solution), Text(), *verdicts, *_file_lines(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
@@ -163,12 +165,13 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
     advice = Text("The best iterate is kept." if stopped else f"What to try: {solution.message}.")
     if quiet:
         return Group(head, advice)
-    worst = _table("worst rows of the last iterate", "violation")
-    # found by their scaled size, in which different units compare; shown in one's own, largest first
+    worst = plain_table(["worst rows of the last iterate", "violation"])
+    # `solution.worst` is ordered by scaled size, in which rows of different units compare: units keep the order
+    # in which they come, and rows of one unit are shown largest first
     units = [unit for _, _, unit in solution.worst]
     for name, violation, unit in sorted(solution.worst, key=lambda row: (units.index(row[2]), -row[1])):
         worst.add_row(name, f"{violation:.2e} {unit}")
-    return Group(*_meshes(solution), Text(), worst, Text(), *_files(written), head, advice)
+    return Group(*_ladder_lines(solution), Text(), worst, Text(), *_file_lines(written), head, advice)
 
 
 def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
@@ -177,7 +180,7 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
 
     energy = trajectory.energy
     most = float(abs(energy - energy[0]).max())
-    # only where nothing does work is a change of energy the scheme's own
+    # where something does work, the energy changes; elsewhere a change is an error of the scheme
     kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
     scale = float(abs(energy).max()) if kept else 0.0
     share = f", {most / scale:.1e} of it" if scale else ""
@@ -231,14 +234,15 @@ def live_line(unit: str) -> Iterator[Callable | None]:
         yield progress
 
 
+# What is said where a tolerance was asked for and not met.
 NOT_MET = "The accuracy asked for is not met: this is the best that was found."
 
 
-def _meshes(solution: Solution) -> list[RenderableType]:
+def _ladder_lines(solution: Solution) -> list[RenderableType]:
     return [Text("Meshes, coarse to fine", "bold"), ladder(solution)]
 
 
-def _accuracy(solution: Solution) -> list[Text]:
+def _estimate(solution: Solution) -> list[Text]:
     """The estimated error and why this mesh, where a tolerance was asked for."""
     if solution.error is None:
         return []
@@ -247,7 +251,7 @@ def _accuracy(solution: Solution) -> list[Text]:
     return [Text(f"{solution.reason}; {words}"), *([Text(NOT_MET, "bold yellow")] if found > asked else [])]
 
 
-def _files(written: Sequence[Path]) -> list[Text]:
+def _file_lines(written: Sequence[Path]) -> list[Text]:
     return [Text(f"wrote {path}") for path in written]
 
 
@@ -261,9 +265,17 @@ def pairs(rows: Sequence[tuple[str, Any]]) -> Table:
     return table
 
 
-def _table(*columns: str, right: int = 0) -> Table:
-    """A plain table; the first `right` columns are numbers."""
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i < right else "left", no_wrap=i == 0)
+def plain_table(
+    columns: Sequence[str], numbers: slice = slice(0), unbroken: slice = slice(1), gap: int = 2
+) -> Table:
+    """A table without lines.
+
+    `numbers` are the columns that stand at the right, `unbroken` those that a narrow terminal must not
+    break into lines, `gap` the spaces between two columns.
+    """
+    table = Table(box=None, padding=(0, gap, 0, 0), header_style="bold")
+    at_the_right, whole = (set(columns[chosen]) for chosen in (numbers, unbroken))
+    for column in columns:
+        side: Literal["left", "right"] = "right" if column in at_the_right else "left"
+        table.add_column(column, justify=side, no_wrap=column in whole)
     return table

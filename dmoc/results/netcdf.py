@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.files import AGAIN, is_sealed, path_of, sealed, whole_file
+from dmoc.basics.files import AGAIN, as_path, is_sealed, sealed, whole_file
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -60,7 +60,7 @@ def read_table(path: str | os.PathLike, form: Format) -> tuple[dict[str, Any], T
     ValueError
         If there is no such file, or it is damaged, of another kind or from a newer dmoc.
     """
-    file = path_of(path)
+    file = as_path(path)
     _refuse_what_is_no_netcdf(file, form)
     whole = is_sealed(file)
     facts, table = _open(file)

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import FreeVector, Vector, entries, number, same_length, short, vector
-from dmoc.effects.motion import as_column, tried
+from dmoc.basics.arguments import FreeVector, Vector, checked, entries, number, same_length, short, vector
+from dmoc.effects.given import as_column, tried
 from dmoc.parts.rows import Row
 
 OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"
@@ -86,8 +86,11 @@ class State(Boundary):
             position = (None,) * len(entries(velocity) or (velocity,))
         if velocity is None:
             velocity = (None,) * len(entries(position) or (position,))
-        object.__setattr__(self, "position", vector("position", position, "m", free=True))
-        object.__setattr__(self, "velocity", vector("velocity", velocity, "m/s", free=True))
+        checked(
+            self,
+            position=vector("position", position, "m", free=True),
+            velocity=vector("velocity", velocity, "m/s", free=True),
+        )
         same_length("State", position=self.position, velocity=self.velocity)
 
     @property
@@ -210,8 +213,8 @@ class Condition(Boundary):
         if scales is None:
             checked: Any = number("scale", self.scale, "unit of the condition", positive=True)
         else:
-            checked = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scales))
-        object.__setattr__(self, "scale", checked)
+            scale = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scales))
+        checked(self, scale=scale)
         if self.state is not None:
             if not isinstance(self.state, State):
                 raise ValueError(f"Condition: state must be a dmoc.State; got {short(self.state)}")

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, flag, number, vector
+from dmoc.basics.arguments import Vector, checked, flag, number, vector
 from dmoc.parts.rows import Row
 from dmoc.scene.elements import ELEMENTS, element_rows, nearest_state, plane_elements
 from dmoc.scene.ends import Boundary
@@ -30,7 +30,7 @@ class _Around(Boundary):
 
     def _check_attractor(self, spatial: bool, size: float | None) -> None:
         name = type(self).__name__
-        object.__setattr__(self, "mu", number("mu", self.mu, "m^3/s^2", positive=True))
+        checked(self, mu=number("mu", self.mu, "m^3/s^2", positive=True))
         center = (0.0, 0.0, 0.0) if spatial and self.center is None else self.center
         if center is not None:
             center = vector("center", center, "m")
@@ -43,7 +43,7 @@ class _Around(Boundary):
                     f"{name}: center is {far:g} m from the origin, where places {abs(size):g} m apart are "
                     "the same number; put the origin nearer"
                 )
-        object.__setattr__(self, "center", center)
+        checked(self, center=center)
 
     def _anywhere(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
         """On the x axis on a circle, where nothing is known but the distance."""
@@ -89,15 +89,15 @@ class CircularOrbit(_Around):
     clockwise: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, "m", positive=True))
+        checked(self, radius=number("radius", self.radius, "m", positive=True))
         if self.normal is not None:
             normal = vector("normal", self.normal, "-")
             length = math.hypot(*normal)
             if len(normal) != 3 or length == 0:
                 raise ValueError(f"CircularOrbit: normal must be a direction in space; got {self.normal!r}")
-            object.__setattr__(self, "normal", tuple(x / length for x in normal))
+            checked(self, normal=tuple(x / length for x in normal))
         self._check_attractor(self.normal is not None, self.radius)
-        object.__setattr__(self, "clockwise", flag("CircularOrbit: clockwise", self.clockwise))
+        checked(self, clockwise=flag("CircularOrbit: clockwise", self.clockwise))
         if self.clockwise and self.dimension == 3:
             raise ValueError("CircularOrbit: clockwise has no meaning in space; give normal=(0, 0, -1)")
 
@@ -188,7 +188,7 @@ class Orbit(_Around):
             value = getattr(self, name)
             if value is not None:
                 unit = {"a": "m", "e": "-"}.get(name, "rad")
-                object.__setattr__(self, name, number(name, value, unit, nonnegative=name == "e"))
+                checked(self, **{name: number(name, value, unit, nonnegative=name == "e")})
         if not self._given:
             raise ValueError("Orbit: every element is None; give at least one of " + ", ".join(ELEMENTS))
         self._check_attractor(self.raan is not None or self.i not in (None, 0.0, math.pi), self.a)

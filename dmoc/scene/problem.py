@@ -10,9 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, number, short
+from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Conservative, Effect
-from dmoc.effects.motion import evaluated
+from dmoc.effects.given import evaluated
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
@@ -70,11 +70,14 @@ class TransferProblem:
     parameters: dict = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", number("mass", self.mass, "kg", positive=True))
-        object.__setattr__(self, "duration", _duration(self.duration))
-        object.__setattr__(self, "start_time", number("start_time", self.start_time, "s"))
-        object.__setattr__(self, "effects", _parts("effects", self.effects, Effect))
-        object.__setattr__(self, "constraints", _parts("constraints", self.constraints, Constraint))
+        checked(
+            self,
+            mass=number("mass", self.mass, "kg", positive=True),
+            duration=_duration(self.duration),
+            start_time=number("start_time", self.start_time, "s"),
+            effects=_parts("effects", self.effects, Effect),
+            constraints=_parts("constraints", self.constraints, Constraint),
+        )
         for name, kind in (
             ("start", Boundary),
             ("goal", Boundary),
@@ -85,7 +88,7 @@ class TransferProblem:
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
         self._complete_ends()
         if self.objective.metered:
-            object.__setattr__(self, "actuator", self.actuator.metered(self.dimension))
+            checked(self, actuator=self.actuator.metered(self.dimension))
         if self.start.dimension != self.goal.dimension:
             raise ValueError(
                 f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
@@ -147,7 +150,7 @@ class TransferProblem:
                 "for example center=(0, 0)"
             )
         for end in ("start", "goal"):
-            object.__setattr__(self, end, getattr(self, end).with_dimension(dimension))
+            checked(self, **{end: getattr(self, end).with_dimension(dimension)})
 
     def _check_clock(self) -> None:
         """Times of a transfer must differ by more than the rounding of the clock."""

@@ -11,7 +11,7 @@ from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
 from dmoc.scene.problem import TransferProblem
 
 # At most this many rows and bounds are told of ...

@@ -14,7 +14,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt
-from dmoc.nlp.program import NLP, Progress
+from dmoc.nlp.solving import NLP, Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level

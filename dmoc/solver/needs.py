@@ -11,7 +11,7 @@ from dmoc.basics.digits import down, up
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import Relaxation, Relaxed
 from dmoc.nlp.layout import Group
-from dmoc.nlp.program import NLP
+from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.parts.constraint import Constraint

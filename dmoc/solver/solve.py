@@ -6,7 +6,7 @@ from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
 from dmoc.motion.lobatto import scheme
-from dmoc.nlp.program import Progress
+from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder

@@ -89,7 +89,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
         ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
         for turns in (1, -1, 2, -2):
             windings = windings_between(problem, base.duration, ends, turns)
-            turned = center + _turned(base.position - center, turns * base.fractions)
+            turned = center + _turned_around(base.position - center, turns * base.fractions)
             position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
     for i, constraint in enumerate(problem.constraints):
@@ -105,7 +105,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
         yield f"bend {number}", replace(base, position=base.position + bend)
 
 
-def _turned(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def _turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Positions around the origin, turned by so many revolutions in the plane of their motion."""
     padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
     normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)

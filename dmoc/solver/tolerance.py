@@ -108,7 +108,7 @@ class _Refinement:
         errors = local_errors(self.ladder.dynamics, path, self.problem.start_time)
         places = corners(self.problem, path, objective)
         most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
-        return _parts(path, errors, places, wanted), most
+        return _cuts_of(path, errors, places, wanted), most
 
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
@@ -148,7 +148,7 @@ def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int,
     return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
 
 
-def _parts(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
+def _cuts_of(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
     """Into how many parts to cut each step.
 
     Two, but for those that together make little of the local errors; at corners as many as lead to the

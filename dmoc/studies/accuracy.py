@@ -29,11 +29,24 @@ from dmoc.solver.solve import solve
 from dmoc.studies.other_methods import Formulation as Formulation
 from dmoc.studies.other_methods import Method, Run, counted, solve_other
 
+# By order, the numbers of steps that are solved unless others are asked for: they span the errors of `TARGETS`,
+# as far as an order gets there in well under a second.
 STEPS = {2: (100, 200, 400, 800, 1600), 4: (25, 50, 100, 200, 400), 6: (16, 24, 48, 96), 8: (8, 16, 32, 64)}
+# Numbers of steps for methods of other people, most of which are of order 2 to 4.
 OTHER_STEPS = (25, 50, 100, 200, 400)
+# The optimum that errors are measured from is solved at order 8 with twice this many steps, and with this many
+# to see how much it still changes.
 REFERENCE_STEPS = 100
-COLD, COMPILED = ", cold", ", compiled"
+# What the name of a method ends with where no coarser mesh came first.
+COLD = ", cold"
+# What the name of a method ends with where its functions are machine code.
+COMPILED = ", compiled"
+# The time is interpolated for these relative errors of the objective [-], from a sketch to all digits shown.
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9)
+# The reference objective is taken to be known to this relative error [-] at best, however little it changed.
+LEAST_ERROR = 1e-14
+# A reference objective that the user gives is taken to be exact to the last bit [-].
+GIVEN_ERROR = 1e-16
 
 
 @dataclass(frozen=True)
@@ -138,7 +151,7 @@ def work_precision(
     """
     if isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1:
         raise ValueError(f"repeats must be a whole number of at least 1; got {repeats!r}")
-    meshes = _meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
+    meshes = _checked_meshes(steps, {f"order {scheme(order).order}": STEPS[order] for order in orders})
     others = dict(against)
     variants = [("", True), *([(COLD, False)] if cold else []), *([(COMPILED, True)] if compiled else [])]
     runs: list[tuple[tuple, Callable[[], Run]]] = [
@@ -152,11 +165,14 @@ def work_precision(
     ]
     runs += [
         ((name, None, count, False), partial(solve_other, problem, name, others[name], count))
-        for name, counts in _meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
+        for name, counts in _checked_meshes(steps, dict.fromkeys(others, OTHER_STEPS)).items()
         for count in counts
     ]
-    value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
+    value, doubt = (
+        best_known(problem) if reference is None else (number("reference", reference, ""), GIVEN_ERROR)
+    )
     untimed = int(solved_before)
+    # the loop over repetitions is the outer one: a slow minute of the computer then falls on all solves alike
     rounds = [
         [_told(progress, labels, solved_before, run) for labels, run in runs] for _ in range(untimed + repeats)
     ]
@@ -175,7 +191,7 @@ def _told(progress: Callable[[str], None] | None, labels: tuple, solved_before: 
     return run()
 
 
-def _meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+def _checked_meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
     """Numbers of steps by the name of the method, checked."""
     chosen = steps if isinstance(steps, Mapping) else {} if steps is None else dict.fromkeys(default, steps)
     meshes = default | {name: tuple(chosen[name]) for name in default if name in chosen}
@@ -193,6 +209,7 @@ def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known:
         steps,
         last.nodes,
         last.objective,
+        # no error is claimed to be smaller than what the reference itself is known to
         max(abs(last.objective - value) / (abs(value) or 1.0), doubt),
         _miss(problem, last.path, scales),
         last.iterations,
@@ -210,7 +227,7 @@ def best_known(problem: TransferProblem) -> tuple[float, float]:
     if not full.success:
         raise ValueError(f"no reference: order 8 on a fine mesh ended with {full.status!r}; give reference=...")
     change = abs(half.objective - full.objective) / (abs(full.objective) or 1.0)
-    return full.objective, max(change, 1e-14)
+    return full.objective, max(change, LEAST_ERROR)
 
 
 def time_to_reach(trials: Sequence[Trial], targets: Sequence[float] = TARGETS) -> dict[str, list[float | None]]:
@@ -240,6 +257,7 @@ def _when(points: list[Trial], target: float) -> float | None:
         return points[0].seconds
     for before, after in pairwise(points):
         if after.error <= target:
+            # a straight line between two solves, where error and time are both drawn on logarithmic axes
             share = np.log(target / before.error) / np.log(after.error / before.error)
             return float(before.seconds * (after.seconds / before.seconds) ** share)
     return None
@@ -252,13 +270,14 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compile
         begun = time.perf_counter()
         ladder = Ladder(problem, options, compiled=compiled)
         first = guess_on(problem, uniform_mesh(steps), order, False)
+        # `climb_to` solves coarser meshes first, `solve_on` the mesh itself from its starting guess
         rung = ladder.climb_to(first) if climbs else ladder.solve_on(first)
         return ladder.solution(rung), time.perf_counter() - begun
 
     try:
         (found, seconds), calls = counted(solve_with)
     except ValueError as error:
-        # a mesh beyond the limit of stability is refused, and the next one may not be
+        # steps beyond the scheme's limit of stability are refused; the finer meshes are measured all the same
         return Run(None, steps * order // 2 + 1, np.nan, f"refused: {error}", 0, 0, np.nan, np.nan)
     facts = found.objective, found.status, found.iterations
     return Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)

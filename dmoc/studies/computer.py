@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import re
 import subprocess
@@ -13,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
 from dmoc.basics.compiled import compiler, folder
+from dmoc.basics.cores import usable_cores
 from dmoc.basics.memory import forget
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.solve import solve
@@ -108,13 +108,6 @@ def benchmark(order: int, steps: int, seconds: float) -> Timing:
         found.append((solution.build_s, solution.solve_s))
     build, spent = zip(*found, strict=True)
     return Timing(order, steps, median(build), median(spent), len(found))
-
-
-def usable_cores() -> int:
-    """Cores this process may use, where the system tells."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _version(package: str) -> str:

@@ -13,12 +13,15 @@ from dmoc.basics.arguments import entries, number, of_kind, whole
 from dmoc.effects.gravity import PointGravity
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.reference import coefficients
 from dmoc.motion.step import step_map, weighted
 from dmoc.scene.ends import State
 from dmoc.scene.problem import TransferProblem
 
+# The name of the integrator that chooses its steps itself.
 ADAPTIVE = "DOP853, adaptive"
-# Steps a revolution at e = 0.3; of the integrator that chooses its steps, the relative tolerance.
+# By method, how many fixed steps a revolution takes on an orbit of eccentricity 0.3; for `ADAPTIVE` relative
+# tolerances instead. The counts are such that errors and times of all methods overlap.
 PER_REVOLUTION: dict[str, Sequence[float]] = {
     "order 2": (100, 300, 900),
     "order 4": (30, 60, 120),
@@ -28,8 +31,9 @@ PER_REVOLUTION: dict[str, Sequence[float]] = {
     "DOP853": (10, 20, 40),
     ADAPTIVE: (1e-9,),
 }
-# Points of a history; as the errors are running maxima, none is lost between two of them.
-SAMPLES = 200
+# A history has this many points at most: a curve in a picture needs no more. No error is lost between two
+# points, since each holds the largest error so far.
+HISTORY_POINTS = 200
 
 
 @dataclass(frozen=True)
@@ -74,8 +78,11 @@ def kepler(eccentricity: float) -> TransferProblem:
 
 
 def per_revolution(eccentricity: float) -> dict[str, Sequence[float]]:
-    """Steps a revolution of an orbit, which pass its periapsis as finely as `PER_REVOLUTION` at e = 0.3."""
-    # the time a passage takes goes with r^1.5
+    """`PER_REVOLUTION` for an orbit of another eccentricity: the periapsis is passed as finely as at e = 0.3.
+
+    Orbits rounder than that take the same counts.
+    """
+    # a passage at radius r takes a time in proportion to r^1.5, and r is 1 - e: at e = 0.3 it is 0.7
     finer = max(1.0, (0.7 / (1 - eccentricity)) ** 1.5)
     return {
         name: counts if name == ADAPTIVE else tuple(round(count * finer) for count in counts)
@@ -89,7 +96,7 @@ def drift(
     methods: Mapping[str, Sequence[float]] | None = None,
     period: float | None = None,
 ) -> list[Drift]:
-    """Coast from the start of a problem by several integrators, with several steps.
+    """Coast from the start of a problem by several integrators, each with several numbers of steps.
 
     The schemes and the explicit Runge-Kutta methods march with fixed steps, each in one loop inside
     CasADi. "DOP853, adaptive" is SciPy's own loop in Python around the same equations of motion.
@@ -126,21 +133,27 @@ def drift(
     for name, choices in chosen.items():
         for choice in choices:
             march = _adaptive if name == ADAPTIVE else _fixed
-            t, q, p, spent = march(name, choice, dynamics, problem, period, duration)
-            energy, turning = _energy_error(dynamics, problem, t, q, p), _turning_error(problem, q, p)
-            rows.append(
-                Drift(
-                    name,
-                    (len(t) - 1) / revolutions,
-                    revolutions,
-                    float(energy.max()),
-                    float(turning.max()),
-                    _growth(t, energy),
-                    spent / revolutions,
-                    _history((t - t[0]) / period, energy, turning),
-                )
-            )
+            marched = march(name, choice, dynamics, problem, period, duration)
+            rows.append(_row_of(name, dynamics, problem, revolutions, period, marched))
     return rows
+
+
+def _row_of(
+    name: str, dynamics: Dynamics, problem: TransferProblem, revolutions: float, period: float, marched: tuple
+) -> Drift:
+    """The errors of one march, given as its times [s], positions [m], momenta [m/s] and seconds spent."""
+    t, q, p, spent = marched
+    energy, turning = _energy_error(dynamics, problem, t, q, p), _turning_error(problem, q, p)
+    return Drift(
+        name,
+        (len(t) - 1) / revolutions,
+        revolutions,
+        float(energy.max()),
+        float(turning.max()),
+        _growth(t, energy),
+        spent / revolutions,
+        _history((t - t[0]) / period, energy, turning),
+    )
 
 
 def _fixed(
@@ -171,23 +184,22 @@ def step_function(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca
 
 
 def _variational(order: int, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
-    """(position and momentum, t, h) -> the same one step later."""
+    """(position and momentum, t, h) -> position and momentum one step later."""
     n, rule = dynamics.positions, scheme(order)
     state, t, h = ca.MX.sym("state", 2 * n), ca.MX.sym("t"), ca.MX.sym("h")
     mass, still = problem.mass * ca.DM.ones(rule.degree + 1), ca.DM.zeros(n, rule.degree + 1)
     dq, dp, _ = step_map(dynamics, rule)(state[:n], state[n:], mass, still, t, h, ca.DM.zeros(n))
     step = ca.Function("step", [state, t, h], [state + ca.vertcat(dq, dp)])
-    # without a root to find one plain expression is three times as fast
+    # where a step has no equation to solve, it is one plain expression, which is three times as fast
     return step.expand() if rule.degree == 1 and not dynamics.depends_on_velocity else step
 
 
 def _explicit(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
-    """(position and velocity, t, h) -> the same one step later, by a Runge-Kutta method of fixed steps."""
-    from scipy.integrate import DOP853
-
-    below = np.diag([0.5, 0.5, 1.0], -1)
-    tableau = np.array([0, 0.5, 0.5, 1]), below, np.array([1, 2, 2, 1]) / 6
-    places, below, weights = tableau if name == "RK4" else (DOP853.C, DOP853.A, DOP853.B)
+    """(position and velocity, t, h) -> position and velocity one step later, by a Runge-Kutta method."""
+    rk4 = np.array([0, 0.5, 0.5, 1]), np.diag([0.5, 0.5, 1.0], -1), np.array([1, 2, 2, 1]) / 6
+    # a Runge-Kutta method is three tables: stage j is at places[j] of the step, where the slopes of the stages
+    # before it, times row j of `below`, lead; the slopes of all stages, times `weights`, make the step
+    places, below, weights = rk4 if name == "RK4" else coefficients()[:3]
     n, slopes = dynamics.positions, list[ca.SX]()
     state, t, h = ca.SX.sym("state", 2 * n), ca.SX.sym("t"), ca.SX.sym("h")
     for place, row in zip(places, below, strict=True):
@@ -204,13 +216,14 @@ def _rate(dynamics: Dynamics, problem: TransferProblem, t: ca.SX, state: ca.SX) 
 def _adaptive(
     name: str, tolerance: float, dynamics: Dynamics, problem: TransferProblem, period: float, duration: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """The same by SciPy's DOP853, which chooses its steps."""
+    """What `_fixed` gives, by SciPy's DOP853, which chooses its steps to meet a relative tolerance."""
     from scipy.integrate import solve_ivp
 
     n = dynamics.positions
     at, now, rate = np.empty(1), np.empty(2 * n), np.empty(2 * n)
     t, state = ca.SX.sym("t"), ca.SX.sym("state", 2 * n)
-    # a buffer spares the conversions of a call, which would take longer than all the rest
+    # CasADi reads and writes these arrays in place: converting them at every call would take longer than all
+    # else in the integrator, and the comparison would be one of conversions
     buffer, trigger = ca.Function("rate", [t, state], [_rate(dynamics, problem, t, state)]).buffer()
     for place, argument in enumerate((at, now)):
         buffer.set_arg(place, argument.data)
@@ -244,41 +257,35 @@ def _energy_error(
 
 
 def _growth(t: np.ndarray, error: np.ndarray) -> float:
+    """Largest error of the last tenth of the time over that of the first tenth."""
     tenth = 0.1 * (t[-1] - t[0])
     early, late = error[t <= t[0] + tenth].max(), error[t >= t[-1] - tenth].max()
     return float(late / early) if early else np.nan
 
 
 def _history(revolutions: np.ndarray, *errors: np.ndarray) -> np.ndarray:
+    """The largest errors so far at revolutions that are evenly spaced on a logarithmic axis."""
     begin, end = min(1.0, revolutions[-1]), revolutions[-1]
-    places = np.unique(np.searchsorted(revolutions, np.geomspace(begin, end, SAMPLES)))
+    places = np.unique(np.searchsorted(revolutions, np.geomspace(begin, end, HISTORY_POINTS)))
     return np.stack([revolutions[places], *(np.maximum.accumulate(error)[places] for error in errors)])
 
 
 def _turning_error(problem: TransferProblem, q: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Relative change of the angular momentum about the first attractor, or the origin."""
     n = problem.dimension
-    arm, push = (np.pad(x, ((0, 0), (0, 3 - n))) for x in (q - _centre(problem), p))
+    arm, push = (np.pad(x, ((0, 0), (0, 3 - n))) for x in (q - problem.attraction.center, p))
     spin = np.cross(arm, push)
     size = np.linalg.norm(spin[0])
     return np.linalg.norm(spin - spin[0], axis=1) / size if size else np.full(len(q), np.nan)
 
 
-def _attractor(problem: TransferProblem) -> PointGravity | None:
-    return next((effect for effect in problem.effects if isinstance(effect, PointGravity)), None)
-
-
-def _centre(problem: TransferProblem) -> np.ndarray:
-    attractor = _attractor(problem)
-    known = None if attractor is None else attractor.center
-    return np.zeros(problem.dimension) if known is None else np.array(known)
-
-
 def _period(problem: TransferProblem) -> float:
     """Period of the orbit of the start around the first attractor [s], by the vis-viva equation."""
-    attractor, (position, velocity) = _attractor(problem), problem.start.fixed()
-    if attractor is not None:
-        inverse = 2 / np.linalg.norm(position - _centre(problem)) - velocity @ velocity / attractor.mu
+    (position, velocity), attraction = problem.start.fixed(), problem.attraction
+    if attraction.first is not None:
+        # 1/a; on a parabola or hyperbola, which never come back, it is not positive
+        mu = attraction.first.mu
+        inverse = 2 / np.linalg.norm(position - attraction.center) - velocity @ velocity / mu
         if inverse > 0:
-            return float(2 * np.pi / np.sqrt(attractor.mu * inverse**3))
+            return float(2 * np.pi / np.sqrt(mu * inverse**3))
     raise ValueError("how long a revolution takes is not known here; give period=... [s]")

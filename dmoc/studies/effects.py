@@ -16,7 +16,6 @@ from dmoc.effects import (
     Drag,
     Effect,
     ExponentialAtmosphere,
-    PointGravity,
     RadiationPressure,
     ThirdBody,
     circular_motion,
@@ -33,9 +32,26 @@ from dmoc.nlp.units import units_of
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
+# Derivatives are evaluated this many times, of which the fastest counts: whatever else the computer does makes
+# an evaluation longer, never shorter.
 REPEATS = 25
-EARTH_MU, EARTH_RADIUS, EARTH_RATE = 3.986004418e14, 6.378137e6, 7.2921159e-5
-SUN_DISTANCE, SUN_RATE = 1.495978707e11, 1.99098e-7
+# Gravitational parameter of the Earth [m^3/s^2] (WGS 84), by which a scene around the Earth is recognised.
+EARTH_MU = 3.986004418e14
+# Two gravitational parameters that differ by less than this share [-] belong to the same body: published values
+# of one body agree far better, two bodies differ far more.
+SAME_BODY = 0.01
+# Equatorial radius of the Earth [m] (WGS 84).
+EARTH_RADIUS = 6.378137e6
+# Rate at which the Earth and its air turn against the stars [rad/s].
+EARTH_RATE = 7.2921159e-5
+# The Earth's second zonal harmonic [-].
+EARTH_J2 = 1.08263e-3
+# Distance of the Sun from the Earth [m], one astronomical unit, taken as constant.
+SUN_DISTANCE = 1.495978707e11
+# Rate at which the Sun goes around the Earth [rad/s]: once a sidereal year.
+SUN_RATE = 1.99098e-7
+# Cross section that a satellite of usual build shows to air and sunlight for its mass [m^2/kg].
+AREA_PER_MASS = 0.01
 
 
 @dataclass(frozen=True)
@@ -75,21 +91,22 @@ def influences(solution: Solution, others: bool = False) -> list[Influence]:
     and sunlight on 0.01 m^2 a kg.
     """
     problem, path = solution.require_problem(), solution.path
-    found = [_one(problem, path, effect, _name(effect), listed=True) for effect in problem.effects]
+    found = [_influence(problem, path, effect, _name(effect), listed=True) for effect in problem.effects]
     missing = candidates(problem) if others else {}
-    return found + [_one(problem, path, effect, name, listed=False) for name, effect in missing.items()]
+    return found + [_influence(problem, path, effect, name, listed=False) for name, effect in missing.items()]
 
 
 def candidates(problem: TransferProblem) -> dict[str, Effect]:
     """Effects of the library that could apply to a scene around the Earth and are not in it, by name."""
-    masses = [effect.mu for effect in problem.effects if isinstance(effect, PointGravity)]
-    if not any(abs(mu / EARTH_MU - 1) < 0.01 for mu in masses) or problem.dimension == 1:
+    masses = [source.mu for source in problem.attraction.sources]
+    if not any(abs(mu / EARTH_MU - 1) < SAME_BODY for mu in masses) or problem.dimension == 1:
         return {}
     sun = circular_motion(SUN_DISTANCE, SUN_RATE)
-    area = 0.01 * problem.mass
+    area = AREA_PER_MASS * problem.mass
+    # density [kg/m^3] and scale height [m] of the air at 400 km (Vallado 2013, table 8-4)
     air = ExponentialAtmosphere(3.725e-12, 4e5, 5.8515e4, EARTH_RADIUS, EARTH_RATE)
     library: dict[str, Effect] = {
-        "J2": J2(EARTH_MU, EARTH_RADIUS, 1.08263e-3),
+        "J2": J2(EARTH_MU, EARTH_RADIUS, EARTH_J2),
         "ThirdBody, the Moon": ThirdBody(4.9048695e12, circular_motion(3.844e8, 2.66170e-6)),
         "ThirdBody, the Sun": ThirdBody(1.32712440018e20, sun),
         f"Drag, area {area:.4g} m^2": Drag(area, 2.2, air),
@@ -103,7 +120,7 @@ def candidates(problem: TransferProblem) -> dict[str, Effect]:
 def _alike(one: Effect, other: Effect) -> bool:
     """Whether two effects are of one kind, and of the same body if they are the pull of one."""
     weights = (getattr(effect, "mu", 0.0) for effect in (one, other))
-    return type(one) is type(other) and math.isclose(*weights, rel_tol=0.01)
+    return type(one) is type(other) and math.isclose(*weights, rel_tol=SAME_BODY)
 
 
 def _name(effect: Effect) -> str:
@@ -118,14 +135,17 @@ def _name(effect: Effect) -> str:
     return ", ".join(words)
 
 
-def _one(problem: TransferProblem, path: DiscretePath, effect: Effect, name: str, listed: bool) -> Influence:
+def _influence(
+    problem: TransferProblem, path: DiscretePath, effect: Effect, name: str, listed: bool
+) -> Influence:
     alone = tuple(other for other in problem.effects if other is not effect)
     without = replace(problem, effects=alone)
     scene = problem if listed else replace(problem, effects=(*problem.effects, effect))
+    # the same controls flown through both scenes: the difference is what the effect does, not the optimiser
     ends = [
-        reference(Dynamics.of(case), path, case.start_time, path.start_velocity)[0] for case in (scene, without)
+        reference(Dynamics.of(each), path, each.start_time, path.start_velocity)[0] for each in (scene, without)
     ]
-    more, less = (_instructions(case, path) for case in (scene, without))
+    more, less = (_instructions(each, path) for each in (scene, without))
     slow, fast = _seconds(path, scene, without)
     return Influence(
         effect,
@@ -143,6 +163,7 @@ def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: 
     n = problem.dimension
     t, q, v, m = state_symbols(n)
     still = ca.DM.zeros(n)
+    # the acceleration of a scene with this effect only, without a force of the actuator
     alone = Dynamics(Translation(n), (effect,), problem.actuator).acceleration(t, q, v, m, still)
     function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
     ends = slice(None, None, scheme(path.order).degree)
@@ -159,14 +180,17 @@ def _instructions(problem: TransferProblem, path: DiscretePath) -> int:
 
 
 def _seconds(path: DiscretePath, *problems: TransferProblem) -> np.ndarray:
-    """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s]; they take turns."""
+    """Least time of each problem to evaluate Jacobian and Hessian on the whole mesh [s].
+
+    The problems take turns, so that a slow moment of the computer falls on all of them.
+    """
     taken = np.empty((REPEATS, len(problems)))
-    cases = []
+    evaluated = []
     for problem in problems:
         nlp = transcribe_onto(problem, path, units_of(problem, path))
-        cases.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
+        evaluated.append((nlp.assembly, nlp.pack(path), nlp.parameters(problem), np.ones(nlp.rows.size)))
     for turn in taken:
-        for i, (assembly, x, p, multipliers) in enumerate(cases):
+        for i, (assembly, x, p, multipliers) in enumerate(evaluated):
             begun = time.perf_counter()
             assembly.jacobian(x, p)
             assembly.hessian(x, p, 1.0, multipliers)

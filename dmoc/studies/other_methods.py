@@ -26,6 +26,18 @@ from dmoc.scene.problem import TransferProblem
 class Formulation:
     """A transfer as some other method writes it in CasADi: an NLP, and what its unknowns mean.
 
+    A method is a function of (problem, steps) that returns one of these. Its duties are:
+
+    1. `x`, `f`, `g`, `bounds` and `row_bounds` state the whole transfer: ends, limits, objective and
+       dynamics. Nothing is added to them.
+    2. Unknowns and rows are scaled by the method itself; `objective_unit` takes `f` back to SI units.
+    3. `guess` is as good a start as the method can make, since it is part of what is compared.
+    4. `ends` and `controls` are expressions in `x`, in SI units, whatever the unknowns are.
+    5. A transfer that the method cannot state raises ValueError with a remedy.
+
+    Derivatives, the choice of a solver, its options and tolerance, timing, and the error at the goal are
+    none of its business: they are the same for all methods.
+
     Attributes
     ----------
     x, f, g : MX
@@ -99,13 +111,17 @@ def as_assembly(made: Formulation) -> Any:
     return SimpleNamespace(x=made.x, p=ca.MX.sym("p", 0), f=made.f, g=made.g, **derivatives)
 
 
-def path_of(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
-    """The ends and controls a method found, in the form that the independent integrator takes."""
+def flown_path(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM) -> tuple[DiscretePath, int]:
+    """The ends and controls that a method found as a path, and its number of nodes.
+
+    The independent integrator reads such a path: its controls are polynomials over each step.
+    """
     ends, forces = (part.full() for part in ca.Function("read", [made.x], [made.ends, made.controls])(x))
     n, points = problem.dimension, np.array(made.points)
+    # where a step's last point is the first one of the next step, the two share one column of `controls`
     shared = int(points[0] == 0 and points[-1] == 1)
     at = np.arange(len(points))[:, None] + (len(points) - shared) * np.arange(steps)
-    # a held control may have any number of components: here the coefficients of its polynomial
+    # the integrator takes a held control of any size; here it is the coefficients of the force's polynomial
     powers = np.linalg.inv(np.vander(points, increasing=True))
     control = np.einsum("pj,njk->kpn", powers, forces[:, at]).reshape(steps, -1)
     position = np.linspace(ends[:n, 0], ends[:n, 1], steps + 1)
@@ -147,13 +163,13 @@ def solve_other(problem: TransferProblem, name: str, method: Method, steps: int)
         return made, result, solver.stats(), [*times, time.perf_counter()]
 
     (made, result, stats, (begun, ready, done)), calls = counted(solve_with)
-    path, nodes = path_of(problem, made, steps, result["x"])
+    path, nodes = flown_path(problem, made, steps, result["x"])
     objective, status = made.objective_unit * float(result["f"]), status_of(stats["return_status"])
     return Run(path, nodes, objective, status, int(stats["iter_count"]), calls, done - begun, done - ready)
 
 
 def counted(solve_with: Callable[[dict[str, Any]], Any]) -> tuple[Any, int]:
-    """What a solve gives, and how many evaluations the summaries of Ipopt name, those of all meshes."""
+    """What a solve gives, and how many evaluations it took on all meshes, as Ipopt prints after each."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "ipopt.txt"
         print_to = {"output_file": str(file), "file_print_level": 3, "file_append": "yes"}

@@ -17,6 +17,7 @@ from dmoc.sweeps.plan import Plan
 if TYPE_CHECKING:
     from xarray import Dataset
 
+# The name and version by which a file of this kind is known, its description, and the remedy where it is none.
 SWEEP_FILE = Format("dmoc sweep", 2, "the result of a sweep", "sweeps are written by dmoc sweep")
 
 
@@ -29,6 +30,7 @@ class Column:
     words: str
 
 
+# The variables of the result; a record that lacks one has the empty value there.
 COLUMNS = {
     "objective": Column(np.nan, "", "objective; not a number where not solved"),
     "duration": Column(np.nan, "s", "duration found"),
@@ -52,7 +54,7 @@ COLUMNS = {
 }
 
 
-def to_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any]) -> Dataset:
+def sweep_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any]) -> Dataset:
     """The dataset of all records, in the order of the points.
 
     A result that has the name of a swept parameter is called found_<name>.
@@ -64,7 +66,7 @@ def to_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[
         dimensions = ("sample_" if "sample" in plan.names else "sample",)
     coordinates: dict[str, Any] = {}
     for i, (parameter, values) in enumerate(zip(plan.parameters, plan.values, strict=True)):
-        about = {"units": _unit(parameter.unit), "long_name": parameter.description or parameter.name}
+        about = {"units": _netcdf_unit(parameter.unit), "long_name": parameter.description or parameter.name}
         coordinates[parameter.name] = (dimensions if plan.sampled else dimensions[i : i + 1], values, about)
     variables: dict[str, Any] = {}
     for name, column in COLUMNS.items():
@@ -85,7 +87,7 @@ def to_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[
     )
 
 
-def write(data: Dataset, path: str | os.PathLike) -> None:
+def write_sweep(data: Dataset, path: str | os.PathLike) -> None:
     """Write a dataset to a netCDF-4 file, whole or not at all."""
     write_table(path, dict(data.attrs), {name: _stored(data, name) for name in map(str, data.variables)})
 
@@ -96,7 +98,7 @@ def _stored(data: Dataset, name: str) -> tuple:
     about = dict(variable.attrs)
     if variable.dtype == bool:
         about["dtype"] = "bool"
-    # coordinates that are no dimension are named by the variables that they belong to
+    # CF conventions: a variable names the coordinates that are not dimensions themselves, as in a sample
     along = [str(other) for other in data.coords if other not in data.dims]
     if along and name not in data.coords:
         about["coordinates"] = " ".join(along)
@@ -104,7 +106,7 @@ def _stored(data: Dataset, name: str) -> tuple:
     return tuple(map(str, variable.dims)), values, about
 
 
-def read(path: str | os.PathLike) -> Dataset:
+def read_sweep(path: str | os.PathLike) -> Dataset:
     """The dataset of a sweep's file.
 
     Raises
@@ -141,7 +143,7 @@ def result(data: Dataset, name: str) -> Any:
     return data[f"found_{name}"] if f"found_{name}" in data else data[name]
 
 
-def _unit(documented: str) -> str:
+def _netcdf_unit(documented: str) -> str:
     return "1" if documented in ("", "-") else documented
 
 

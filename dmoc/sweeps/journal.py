@@ -7,14 +7,18 @@ says what sweep it is. A line that was cut short, and what follows it, is solved
 from __future__ import annotations
 
 import json
-import math
 import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-FORMAT = "dmoc sweep journal"
+from dmoc.basics.plain import finite
+
+# The first line of a journal names this format: a file that does not is never written over.
+JOURNAL_FORMAT = "dmoc sweep journal"
+# A journal is named like the result file, with this at the end.
 SUFFIX = ".journal"
+# The remedy that is told where a journal belongs to another sweep.
 KEPT = "give --restart to begin anew, or another --out"
 
 try:
@@ -51,7 +55,7 @@ class Journal:
             raise ValueError(f"cannot write {out}: it is a folder; add a file name")
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            self._begin({"format": FORMAT, "version": 1, **facts}, restart)
+            self._begin({"format": JOURNAL_FORMAT, "version": 1, **facts}, restart)
         except BaseException:
             os.close(self._file)
             raise
@@ -63,13 +67,13 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if not self.records and self.path.exists():
-            # nothing to go on from, so nothing to be refused for later
+            # no point was finished: an empty journal would only have the next sweep refused
             self.path.unlink()
         os.close(self._file)
 
     def append(self, wave: int, point: int, record: dict[str, Any], path: str | None) -> None:
         """Keep a finished point; it is on the disk when this returns."""
-        record = _finite(record)
+        record = finite(record)
         entry = {"wave": wave, "point": point, "record": record, "path": path}
         self._places[wave, point] = self._write(entry)
         self.records[wave, point] = record
@@ -98,13 +102,15 @@ class Journal:
             _settle(self.path.parent)
 
     def _read(self, stream: Any, facts: dict[str, Any] | None) -> int:
-        """Take over what is there, unless it is to be forgotten; where the good lines end."""
+        """Take over the records of an earlier run, unless `facts` is None; where the good lines end."""
         head = stream.readline()
-        start = json.dumps({"format": FORMAT})[:-1].encode()
+        # what every journal begins with, up to the comma: a head that was cut short is the beginning of it
+        start = json.dumps({"format": JOURNAL_FORMAT})[:-1].encode()
         if not head.startswith(start) and not (start.startswith(head) and not head.endswith(b"\n")):
             raise ValueError(f"{self.path} is not the journal of a sweep; move it away, or give another --out")
         if facts is None or not head.endswith(b"\n"):
             return 0
+        # `facts` through JSON and back: tuples become lists, as they are in the file
         if changes := differences(_parsed(head) or {}, json.loads(json.dumps(facts))):
             raise ValueError(f"{self.path} belongs to another sweep: {'; '.join(changes)}; {KEPT}")
         end = len(head)
@@ -148,11 +154,11 @@ def differences(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
         elif isinstance(was, dict) and isinstance(now, dict):
             found += differences(was, now)
         else:
-            found.append(f"{name} was {_words(was)} and is now {_words(now)}")
+            found.append(f"{name} was {_value_in_words(was)} and is now {_value_in_words(now)}")
     return found
 
 
-def _words(value: Any) -> str:
+def _value_in_words(value: Any) -> str:
     if isinstance(value, list) and len(value) > 3:
         return f"{len(value)} values from {value[0]} to {value[-1]}"
     if isinstance(value, list):
@@ -169,16 +175,8 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
     return entry if isinstance(entry, dict) else None
 
 
-def _finite(record: dict[str, Any]) -> dict[str, Any]:
-    """Numbers that are not finite become null: JSON has no word for them."""
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in record.items()
-    }
-
-
 def _settle(folder: Path) -> None:
-    """The name of a new file on the disk too."""
+    """Wait until the names of new files in a folder are on the disk, which `fsync` of a file leaves open."""
     place = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(place)

@@ -11,10 +11,10 @@ from typing import Any
 from dmoc.sweeps.journal import Journal
 from dmoc.sweeps.plan import Plan
 from dmoc.sweeps.pool import Pool
-from dmoc.sweeps.retry import DIED, MOST_LOOKS, better, doubtful, next_to
-from dmoc.sweeps.worker import Task, failure
+from dmoc.sweeps.retry import DIED, MOST_LOOKS, better, first_retries, further_retries
+from dmoc.sweeps.worker import Task, failed_record
 
-Progress = Callable[[int, int, int], Any]
+SweepProgress = Callable[[int, int, int], Any]
 
 
 @dataclass
@@ -27,8 +27,8 @@ class Sweep:
     Attributes
     ----------
     task : callable
-        What a worker is told, from the number of a point, the path to start from, and whether it is
-        a second look.
+        Makes the task of a worker from the number of a point, the path to start from or None, and whether
+        the point was tried before.
     progress : callable or None
         Called with (solves made, solves in all as far as known, points not solved so far).
     best : dict
@@ -41,21 +41,22 @@ class Sweep:
     journal: Journal
     pool: Pool
     task: Callable[[int, str | None, bool], Task]
-    progress: Progress | None = None
+    progress: SweepProgress | None = None
     best: dict[int, tuple[int, dict[str, Any]]] = field(default_factory=dict)
     looks: Counter[int] = field(default_factory=Counter)
     tries: int = 0
     unsolved: int = 0
 
     def run(self, follow: bool) -> list[dict[str, Any]]:
-        """All records, in the order of the points."""
+        """All records, in the order of the points; wave 0 tries every point once, later waves some again."""
         self._wave(0, {point: self.plan.before(point) if follow else None for point in range(self.plan.size)})
-        wave, again = 1, doubtful(self.plan, self._records(), follow)
+        wave, again = 1, first_retries(self.plan, self._records(), follow)
         while again:
             before = {point: self.best[point] for point in again}
             self._wave(wave, again)
+            # the record that counts comes from another wave than before: the point became better
             changed = {point: old for point, (at, old) in before.items() if self.best[point][0] != at}
-            again = next_to(self.plan, self._records(), changed, again)
+            again = further_retries(self.plan, self._records(), changed, again)
             again = {point: parent for point, parent in again.items() if self.looks[point] < MOST_LOOKS}
             wave += 1
         return self._records()
@@ -68,6 +69,8 @@ class Sweep:
         ready, children = self._sorted_out(wave, parents)
         left = len(ready) + sum(map(len, children.values()))
         running: dict[Future, int] = {}
+        # when a worker process dies, all points under way are lost and any of them may be the cause: each is
+        # then tried alone, and the one that kills its worker again is the culprit
         suspects: deque[int] = deque()
         while left:
             alone = bool(suspects) and not running
@@ -79,12 +82,11 @@ class Sweep:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 point, outcome = running.pop(future), self._outcome(future)
                 if outcome is None and not alone:
-                    # any of the points that were under way may have brought the worker down
                     suspects.append(point)
                     continue
                 if alone:
                     suspects.popleft()
-                outcome = outcome or (failure(DIED, "its worker process ended, twice"), None)
+                outcome = outcome or (failed_record(DIED, "its worker process ended, twice"), None)
                 self.journal.append(wave, point, *outcome)
                 self._settle(wave, point)
                 ready.extend(children.pop(point, ()))
@@ -96,7 +98,10 @@ class Sweep:
             self.progress(self.tries, self.tries + left, self.unsolved)
 
     def _sorted_out(self, wave: int, parents: Mapping[int, int | None]) -> tuple[deque, dict[int, list[int]]]:
-        """The points that can be begun, and those that wait for a parent; the journal may have some already."""
+        """The points that can be begun, and by parent those that wait for its answer.
+
+        Points that the journal has from an earlier run are settled and not tried again.
+        """
         ready: deque[int] = deque()
         children: dict[int, list[int]] = {}
         for point, parent in parents.items():
@@ -126,7 +131,7 @@ class Sweep:
             raise OSError("the scheduler was lost; the journal is kept: run the same sweep again") from None
 
     def _settle(self, wave: int, point: int) -> None:
-        """Let a record count if it is the first of its point, or better."""
+        """Let a point's record in the journal count if it is the first of that point, or better."""
         record = self.journal.records[wave, point]
         self.looks[point] += 1
         self.tries += 1

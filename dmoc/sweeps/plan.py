@@ -13,11 +13,15 @@ import numpy as np
 
 from dmoc.scene.problem_file import Parameter, ProblemFile
 
+# A sweep has at most this many points: with solves of 0.1 s they take a day of one core, and a typing error in
+# a count is told before the work begins.
 MOST_POINTS = 1_000_000
-# With `follow`, every so many points along the last axis one starts from the problem's own guess: a
-# wrong branch of local optima goes no further, and what lies apart can be solved at the same time.
+# With `follow`, a point starts from the answer of the one before it along the last axis, except every 8th,
+# which starts from the problem's own guess: a wrong branch of local optima then spoils 8 points at most, and
+# several runs of 8 points can be solved at the same time.
 RUN = 8
-METHODS = ("sobol", "latin")
+# How a sample can be spread over its ranges.
+SAMPLINGS = ("sobol", "latin")
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,7 @@ class Plan:
             far = np.sum((self._cube - self._cube[point]) ** 2, axis=1)
             nearest = np.argsort(far, kind="stable")
             return [[int(other) for other in nearest if other != point][: 2 * len(self.values)]]
+        # points are numbered as in a C-ordered array: a step along a dimension adds its stride to the number
         stride, found = self.size, []
         for length, values in zip(self.shape, self.values, strict=True):
             stride //= length
@@ -146,7 +151,7 @@ def _grid(parameter: Parameter, given: Any) -> np.ndarray:
     if not isinstance(given, str):
         values = list(given) if isinstance(given, Iterable) else [given]
     elif ":" in given and given.strip()[0] not in "'\"":
-        start, stop, count = _numbers(name, given, 3, "start:stop:count, for example 8:20:25")
+        start, stop, count = _numbers_of(name, given, 3, "start:stop:count, for example 8:20:25")
         if count != int(count) or not 1 <= count <= MOST_POINTS:
             raise ValueError(f"{name}: the count in {given!r} must be a whole number of at least 1")
         values = np.linspace(start, stop, int(count)).tolist()
@@ -187,11 +192,11 @@ def _checked(parameter: Parameter, values: list) -> np.ndarray:
 
 
 def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) -> tuple[np.ndarray, ...]:
-    """Points spread over the ranges, by columns."""
+    """Points spread over the ranges: one array a parameter, with its value at every point."""
     from scipy.stats import qmc
 
-    if method not in METHODS:
-        raise ValueError(f"the method must be {' or '.join(METHODS)}; got {method!r}")
+    if method not in SAMPLINGS:
+        raise ValueError(f"the method must be {' or '.join(SAMPLINGS)}; got {method!r}")
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POINTS:
         raise ValueError(f"a sample must have 1 to {MOST_POINTS} points; got {count!r}")
     for parameter in parameters:
@@ -201,7 +206,7 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
     if method == "latin":
         unit = qmc.LatinHypercube(len(ranges), seed=seed).random(count)
     else:
-        # the whole power of two that holds them: its first points are spread as well as any
+        # Sobol points come in powers of two; the first `count` of the next larger one are spread as evenly
         unit = qmc.Sobol(len(ranges), seed=seed).random_base2((count - 1).bit_length())[:count]
     low, high = np.array(ranges).T
     return tuple((low + unit * (high - low)).T.copy())
@@ -209,7 +214,7 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
 
 def _range(name: str, given: Any) -> list[float]:
     if isinstance(given, str):
-        given = _numbers(name, given, 2, "start:stop in a sample, for example 8:20")
+        given = _numbers_of(name, given, 2, "start:stop in a sample, for example 8:20")
     try:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):
@@ -219,7 +224,7 @@ def _range(name: str, given: Any) -> list[float]:
     return [low, high]
 
 
-def _numbers(name: str, text: str, count: int, form: str) -> list[float]:
+def _numbers_of(name: str, text: str, count: int, form: str) -> list[float]:
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:

@@ -18,9 +18,13 @@ from typing import Any, Protocol
 
 from dmoc.sweeps.worker import Task, solve_point
 
-# A sweep fills the cores with processes; threads of the linear algebra inside each would only get in the way.
+# Every worker process uses one thread for linear algebra: the sweep has a process a core already, and more
+# threads would compete for the same cores.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-PATIENCE_S = 10
+# A scheduler and its first worker must answer within this time [s]; on a network it takes a fraction of one.
+ANSWER_WITHIN_S = 10
+# The message where workers die at once. A spawned worker runs the user's script again up to the call of
+# `sweep`, which must not start workers of its own.
 UNGUARDED = (
     "the worker processes end as soon as they start; in a script, call sweep() below "
     'if __name__ == "__main__":, since every worker reads the script too'
@@ -48,7 +52,7 @@ class LocalPool:
 
     def __enter__(self) -> LocalPool:
         self._before = {name: os.environ.get(name) for name in ONE_THREAD}
-        # read when a library is loaded, so it has to be there before the processes start
+        # libraries read these variables when they are loaded, so they must be set before the processes start
         os.environ.update(ONE_THREAD)
         self._start()
         try:
@@ -85,6 +89,8 @@ class LocalPool:
     def _start(self) -> None:
         # a forked child would share CasADi's and the caller's threads and locks
         context = multiprocessing.get_context("spawn")
+        # a pipe of which this process alone holds the other end: when that end closes, also because this
+        # process was killed, every worker that waits at its own end is woken and exits
         self._lifeline, self._held = context.Pipe(duplex=False)
         self.executor = ProcessPoolExecutor(
             self.workers, mp_context=context, initializer=_live_on, initargs=(self._lifeline,)
@@ -120,18 +126,18 @@ class SchedulerPool:
         except ImportError:
             raise ValueError("--scheduler needs dask.distributed: pip install distributed") from None
         self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
-        # what it logs, with tracebacks, is raised here in one line
+        # the library logs failures with a traceback; here each becomes an exception with a message of one line
         self._log = logging.getLogger("distributed.client")
         self._loudness = self._log.level
         self._log.setLevel(logging.CRITICAL)
         try:
-            # a client that was never begun takes 20 s to end, and says so with a traceback
+            # a client with a malformed address would take 20 s to fail, with a traceback: refuse it before
             parse_host_port(parse_address(address)[1])
-            self.client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+            self.client = Client(address, timeout=ANSWER_WITHIN_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ValueError(f"no scheduler answers at {address} ({error})") from None
         try:
-            self.client.wait_for_workers(1, timeout=PATIENCE_S)
+            self.client.wait_for_workers(1, timeout=ANSWER_WITHIN_S)
         except TimeoutError:
             self.client.close()
             raise ValueError(f"the scheduler at {address} has no workers; start some: dask worker") from None
@@ -147,7 +153,7 @@ class SchedulerPool:
         self._log.setLevel(self._loudness)
 
     def submit(self, task: Task) -> Future:
-        """As `Client.get_executor().submit`, whose future never ends if a worker is lost with its result."""
+        """Do what `Client.get_executor().submit` does, whose future never ends if its worker is lost."""
         found: Future = Future()
         if self.client.status != "running":
             found.set_exception(CancelledError())
@@ -174,13 +180,13 @@ class SchedulerPool:
         try:
             return 2 * max(1, sum(self.client.nthreads().values()))
         except OSError:
-            # the scheduler does not answer: what is submitted next will say so
+            # the scheduler does not answer: the future of the next point will say so
             return 1
 
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Ctrl-C waits, and processes that start meanwhile never see it: it is their parent's business."""
+    """Hold Ctrl-C back; processes started meanwhile inherit that and never see it: their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -192,7 +198,7 @@ def _no_interrupt() -> Iterator[None]:
 
 
 def _live_on(lifeline: Any) -> None:
-    """Let a worker end with its parent, however that ends."""
+    """Make this worker process exit as soon as its parent is gone, however the parent ended."""
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
 
 

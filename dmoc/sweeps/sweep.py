@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.basics.cores import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
-from dmoc.sweeps.data import as_attributes, to_dataset, write
+from dmoc.sweeps.data import as_attributes, sweep_dataset, write_sweep
 from dmoc.sweeps.journal import Journal
-from dmoc.sweeps.loop import Progress, Sweep
+from dmoc.sweeps.loop import Sweep, SweepProgress
 from dmoc.sweeps.plan import Plan, make_plan
 from dmoc.sweeps.pool import LocalPool, Pool, SchedulerPool
 from dmoc.sweeps.worker import Task
@@ -21,7 +22,7 @@ from dmoc.sweeps.worker import Task
 if TYPE_CHECKING:
     from xarray import Dataset
 
-# More processes than any computer has use for.
+# A sweep takes at most this many worker processes: more than any computer has cores.
 MOST_WORKERS = 4096
 
 
@@ -42,7 +43,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
-    progress: Progress | None = None,
+    progress: SweepProgress | None = None,
 ) -> Dataset:
     """Solve and verify a problem at many values of its parameters.
 
@@ -64,7 +65,7 @@ def sweep(
         By name of the parameter the values of the grid, or a text "start:stop:count" or
         "value,value,..."; for a sample a range (start, stop) or "start:stop". Units as documented there.
     out : path
-        The netCDF file to write.
+        The netCDF file to write_sweep.
     settings : mapping
         Values of other parameters.
     sample : int
@@ -125,23 +126,18 @@ def sweep(
             journal.remove()
             raise ValueError(f"every point was refused, the first with: {records[0]['message']}")
         created = {"created": datetime.now(UTC).isoformat(timespec="seconds")}
-        data = to_dataset(plan, records, as_attributes(facts) | created)
-        write(data, out)
+        data = sweep_dataset(plan, records, as_attributes(facts) | created)
+        write_sweep(data, out)
         journal.remove()
     return data
 
 
 def _pool(workers: int | None, scheduler: str | None) -> Pool:
     if scheduler is None:
-        return LocalPool(workers or cores())
+        return LocalPool(workers or usable_cores())
     if workers is not None:
         raise ValueError("a scheduler has its own workers; leave out the number of workers")
     return SchedulerPool(scheduler)
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _facts(file: ProblemFile, plan: Plan, fixed: dict[str, Any], numerics: dict[str, Any]) -> dict[str, Any]:

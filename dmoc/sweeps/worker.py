@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from dmoc.basics.plain import unbroken
 from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
 
+# In a packed path the names of multipliers begin with this, so that they cannot be taken for those of a field.
 MULTIPLIER = "multiplier "
-# A scheduler may give its workers several threads; one process solves one point at a time all the same.
+# A process solves one point at a time, also where a scheduler runs several threads in it: the output of a
+# point is redirected, which is done for the whole process.
 _TURN = threading.Lock()
 
 
@@ -67,16 +70,16 @@ def solve_point(task: Task) -> tuple[dict[str, Any], str | None]:
         try:
             problem = file.make(**task.values)
             solution, warm = _solve(problem, task)
-            return _record(solution, warm), pack(solution.path) if solution.success else None
+            return _record_of(solution, warm), pack(solution.path) if solution.success else None
         except ValueError as error:
-            return failure("refused", error), None
+            return failed_record("refused", error), None
         except Exception as error:  # a user's own effect can raise anything
-            return failure("error", f"{type(error).__name__}: {error}"), None
+            return failed_record("error", f"{type(error).__name__}: {error}"), None
 
 
-def failure(status: str, message: Any) -> dict[str, Any]:
+def failed_record(status: str, message: Any) -> dict[str, Any]:
     """The record of a point that came to no iterate."""
-    return {"status": status, "message": " ".join(str(message).split())}
+    return {"status": status, "message": unbroken(message)}
 
 
 def pack(path: DiscretePath) -> str:
@@ -127,7 +130,7 @@ def _solve(problem: TransferProblem, task: Task) -> tuple[Solution, bool]:
     return solve(problem, **task.numerics), False
 
 
-def _record(solution: Solution, warm: bool) -> dict[str, Any]:
+def _record_of(solution: Solution, warm: bool) -> dict[str, Any]:
     """What is kept of a solution; figures of a failed one mean nothing and are left out."""
     from dmoc.checks.verification import verify
 

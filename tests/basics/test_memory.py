@@ -185,13 +185,15 @@ def test_another_solve_makes_nothing_anew_and_has_the_same_answer(name):
     forget()
     first = solve(problem, order=4, steps=20)
     verify(first)
-    before = dict(memory._known)
+    before = dict(memory._functions._held)
     assert before
     again = solve(load_problem(name).make(), order=4, steps=20)
     verify(again)
     assert again.iterations == first.iterations
     np.testing.assert_array_equal(again.position, first.position)
-    assert {key: id(value) for key, value in memory._known.items()} == {k: id(v) for k, v in before.items()}
+    assert {key: id(value) for key, value in memory._functions._held.items()} == {
+        k: id(v) for k, v in before.items()
+    }
 
 
 def test_what_measures_starts_anew():

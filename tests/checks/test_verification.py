@@ -31,7 +31,7 @@ from dmoc import (
     UniformGravity,
     solve,
 )
-from dmoc.checks.evidence import Case
+from dmoc.checks.evidence import Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
 from dmoc.checks.verification import verify
@@ -377,7 +377,7 @@ def test_optimality_means_the_same_on_every_mesh():
         values = known[COSTATE]
         wave = 1e-4 * np.abs(values).max() * np.sin(np.pi * solution.path.fractions)[:, None] ** 4
         bad = with_path(solution, multipliers=known | {COSTATE: values + wave})
-        found.append(stationarity(Case(bad)))
+        found.append(stationarity(Evidence(bad)))
     coarse, fine = found
     assert coarse.force == pytest.approx(1e-4, rel=0.1)
     assert fine.force == pytest.approx(coarse.force, rel=0.1)
@@ -393,7 +393,7 @@ def test_optimality_fails_alone_on_a_false_objective(orbit, cart):
 def test_least_effort_has_the_costate_of_the_force(orbit):
     """lambda = -m F at every node, to round-off."""
     assert np.allclose(orbit.costate, -orbit.force, rtol=0, atol=1e-13 * np.abs(orbit.force).max())
-    assert stationarity(Case(orbit)).force < 1e-13
+    assert stationarity(Evidence(orbit)).force < 1e-13
 
 
 @dataclass(frozen=True)
@@ -538,7 +538,7 @@ def allowances(problem, **options):
     assert solution.success
     return {
         limit.name: limit
-        for limit in excesses(Case(solution))
+        for limit in excesses(Evidence(solution))
         if "between" in limit.name or limit.name.startswith("SpeedLimit")
     }
 

@@ -102,7 +102,7 @@ def test_json_stays_pure_when_the_problem_file_prints(run, folder):
 
 def test_numbers_that_are_not_finite_become_null():
     from dmoc.checks.verification import Check, Report
-    from dmoc.reports.as_json import as_text, result
+    from dmoc.reports.as_json import as_text, solve_object
 
     class Diverged:
         problem = type("Problem", (), {"name": "p"})
@@ -114,7 +114,7 @@ def test_numbers_that_are_not_finite_become_null():
             return self.problem
 
     report = Report((Check("residual", float("inf"), float("nan"), "N", False),), 0.3)
-    found = json.loads(as_text(result(Diverged(), report)))
+    found = json.loads(as_text(solve_object(Diverged(), report)))
     assert found["objective"] is None and found["duration"] is None
     assert found["checks"]["residual"] == {"value": None, "limit": None, "unit": "N", "ok": False}
 

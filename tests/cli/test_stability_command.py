@@ -7,7 +7,7 @@ import pytest
 
 from dmoc.cli.app import main
 from dmoc.studies.drift import drift, kepler, per_revolution
-from dmoc.studies.rounding import REACH, growth, round_off
+from dmoc.studies.rounding import H_OMEGA, growth, round_off
 
 
 def run(capfd, *arguments):
@@ -39,12 +39,13 @@ def test_steps_follow_the_passage():
 def test_edges_of_stability_are_where_theory_has_them():
     """Order 2: h omega = 2. Order 4: growth (the (2, 2) element of its matrix) from 2 sqrt 2 to 2 sqrt 3."""
     rows = {row.method: row for row in growth()}
-    grid = REACH[1] - REACH[0]
-    assert rows["order 2"].gaps[0][:2] == pytest.approx((2.0, REACH[-1]), abs=1.1 * grid)
+    grid = H_OMEGA[1] - H_OMEGA[0]
+    assert rows["order 2"].gaps[0][:2] == pytest.approx((2.0, H_OMEGA[-1]), abs=1.1 * grid)
     assert rows["order 4"].gaps[0][:2] == pytest.approx((2 * np.sqrt(2), 2 * np.sqrt(3)), abs=1.1 * grid)
     assert len(rows["order 8"].gaps) == 2 and rows["order 8"].gaps[0][0] == pytest.approx(3.1404, abs=2 * grid)
     # |1 + z + z^2/2 + z^3/6 + z^4/24| at z = i: a hundredth of the energy is lost a step
-    assert rows["RK4"].growth[np.searchsorted(REACH, 1.0)] == pytest.approx(np.hypot(13 / 24, 5 / 6), rel=1e-3)
+    at_one = rows["RK4"].growth[np.searchsorted(H_OMEGA, 1.0)]
+    assert at_one == pytest.approx(np.hypot(13 / 24, 5 / 6), rel=1e-3)
     for name in ("order 2", "order 4", "order 6", "order 8"):
         below = rows[name].reach < rows[name].gaps[0][0]
         assert np.abs(rows[name].growth[below] - 1).max() < 1e-6

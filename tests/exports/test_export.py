@@ -34,7 +34,7 @@ from dmoc.cli.app import main
 from dmoc.exports import export as exporting
 from dmoc.exports.code import write_code
 from dmoc.exports.export import functions_of
-from dmoc.exports.functions import rollout, step
+from dmoc.exports.functions import all_steps, one_step
 from dmoc.exports.planner import Planner
 from dmoc.exports.residual import residual
 
@@ -209,7 +209,7 @@ def test_c_code_hardly_grows_with_the_number_of_steps(tmp_path, order, hold):
     for steps in (50, 5000):
         planner = planner_of(TURNING, order, steps, hold)
         (tmp_path / f"{steps}").mkdir()
-        coded = [make(planner.scene) for make in (step, rollout, residual)]
+        coded = [make(planner.scene) for make in (one_step, all_steps, residual)]
         write_code(planner, coded, tmp_path / f"{steps}")
         source = (tmp_path / f"{steps}" / "functions.c").read_text()
         sizes.append(len(source))

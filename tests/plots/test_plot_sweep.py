@@ -8,8 +8,8 @@ from sweep_helpers import FAILED, found, plan_of
 import dmoc
 from dmoc.cli.app import main
 from dmoc.plots.front import pareto
-from dmoc.plots.sweep import figure, save_sweep
-from dmoc.sweeps.data import is_sweep, read, to_dataset, write
+from dmoc.plots.sweep import save_sweep, sweep_figure
+from dmoc.sweeps.data import is_sweep, read_sweep, sweep_dataset, write_sweep
 
 
 def picture(plan, value, **more):
@@ -22,12 +22,12 @@ def picture(plan, value, **more):
             solved | {"objective_unit": "N^2 s", "effort": objective, "duration": 1.0, "propellant": 0.0}
         )
         records[-1] |= {name: function(plan.at(point)) for name, function in more.items()}
-    return to_dataset(plan, records, {"problem": "a_push", "settings": "{}"})
+    return sweep_dataset(plan, records, {"problem": "a_push", "settings": "{}"})
 
 
 def test_one_parameter_is_a_curve_with_failures_marked(tmp_path):
     data = picture(plan_of(9), lambda at: None if at["p0"] < 3 else 1 + (at["p0"] - 5) ** 2)
-    (axes,) = figure(data).axes
+    (axes,) = sweep_figure(data).axes
     by_label = {line.get_label(): line for line in axes.get_lines()}
     assert np.nanmin(by_label["solved"].get_ydata()) == 1 and len(by_label["not solved"].get_xdata()) == 3
     assert axes.get_ylabel() == "effort [N\u00b2 s]"
@@ -35,7 +35,7 @@ def test_one_parameter_is_a_curve_with_failures_marked(tmp_path):
 
 def test_a_sample_of_one_parameter_is_a_curve_in_order():
     data = picture(plan_of(8, sampled=True), lambda at: None if at["p0"] > 6 else 1 + at["p0"] ** 2)
-    (axes,) = figure(data).axes
+    (axes,) = sweep_figure(data).axes
     by_label = {line.get_label(): line for line in axes.get_lines()}
     x, y = by_label["solved"].get_data()
     assert (np.diff(x) > 0).all() and (np.diff(y[np.isfinite(y)]) > 0).all()
@@ -47,7 +47,7 @@ def test_two_parameters_are_a_map_with_failures_hatched(tmp_path):
         return None if at["p0"] + at["p1"] < 2 else 1 + at["p0"] + 2 * at["p1"]
 
     data = picture(plan_of(6, 5), effort, duration=lambda at: 10 - at["p0"])
-    page = figure(data)
+    page = sweep_figure(data)
     hatched = [c for c in page.axes[0].collections if c.get_label() == "not solved"]
     assert len(hatched[0].get_paths()) == 3 and hatched[0].get_hatch()
     assert page.axes[1].get_title("left") == "Time against effort"
@@ -55,16 +55,16 @@ def test_two_parameters_are_a_map_with_failures_hatched(tmp_path):
         save_sweep(data, tmp_path / f"map{suffix}")
         assert (tmp_path / f"map{suffix}").stat().st_size > 1000
     three = picture(plan_of(4, 4, 3), lambda at: 1 + at["p0"] + at["p1"] + at["p2"])
-    assert "the best over p2" in figure(three).axes[0].get_title("left")
+    assert "the best over p2" in sweep_figure(three).axes[0].get_title("left")
     sample = picture(plan_of(9, 9, sampled=True), lambda at: 1 + at["p0"])
-    assert figure(sample).axes[0].get_xlabel() == "p0"
-    assert figure(picture(plan_of(4, 4), lambda at: None)).axes
+    assert sweep_figure(sample).axes[0].get_xlabel() == "p0"
+    assert sweep_figure(picture(plan_of(4, 4), lambda at: None)).axes
 
 
 @pytest.mark.parametrize(("across", "up"), [(7, 6), (20, 6), (20, 14)])
 def test_contours_bear_numbers_where_these_do_not_overlap(across, up):
     """Wherever there are numbers, no two of them share ink: on the steepest side of a map."""
-    page = figure(picture(plan_of(across, up), lambda at: 1 + at["p0"] ** 2 + at["p1"] ** 4))
+    page = sweep_figure(picture(plan_of(across, up), lambda at: 1 + at["p0"] ** 2 + at["p1"] ** 4))
     page.canvas.draw()
     boxes = [text.get_window_extent() for text in page.axes[0].texts]
     assert bool(boxes) == (min(across, up) >= 12)
@@ -81,7 +81,7 @@ def test_the_front_is_what_no_other_beats_in_both():
 
 
 def test_dmoc_plot_knows_a_sweep(tmp_path, capfd):
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "out.nc")
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "out.nc")
     with pytest.raises(SystemExit) as end:
         main(["plot", str(tmp_path / "out.nc")])
     assert not end.value.code and "out.png" in capfd.readouterr().out
@@ -100,19 +100,19 @@ def test_other_files_are_told_apart(tmp_path):
         (tmp_path / "none.nc", "not exist"),
     ):
         with pytest.raises(ValueError, match=words):
-            read(path)
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
+            read_sweep(path)
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), tmp_path / "sweep.nc")
     with pytest.raises(ValueError, match=r"result of a sweep; draw it with: dmoc plot"):
         dmoc.load(tmp_path / "sweep.nc")
 
 
 def test_a_damaged_sweep_is_refused_before_anything_opens_it(tmp_path, capfd):
     path = tmp_path / "out.nc"
-    write(picture(plan_of(4), lambda at: 1 + at["p0"]), path)
+    write_sweep(picture(plan_of(4), lambda at: 1 + at["p0"]), path)
     whole, random = path.read_bytes(), np.random.default_rng(0)
     for place in random.integers(len(whole), size=40):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 255]) + whole[place + 1 :])
-        for reader in (read, is_sweep):
+        for reader in (read_sweep, is_sweep):
             with pytest.raises(ValueError, match="is damaged: its checksum does not hold"):
                 reader(path)
     with pytest.raises(SystemExit) as end:
@@ -120,13 +120,13 @@ def test_a_damaged_sweep_is_refused_before_anything_opens_it(tmp_path, capfd):
     assert end.value.code == 2
     assert len(capfd.readouterr().err.splitlines()) == 1
     path.write_bytes(whole)
-    assert read(path).identical(picture(plan_of(4), lambda at: 1 + at["p0"]))
+    assert read_sweep(path).identical(picture(plan_of(4), lambda at: 1 + at["p0"]))
 
 
 def test_a_sweep_of_the_first_format_has_no_checksum_and_loads(tmp_path):
     path, data = tmp_path / "out.nc", picture(plan_of(4), lambda at: 1 + at["p0"])
     data.assign_attrs(format_version=1).to_netcdf(path, engine="h5netcdf")
-    assert is_sweep(path) and read(path).sizes == data.sizes
+    assert is_sweep(path) and read_sweep(path).sizes == data.sizes
     data.to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match="lacks its checksum"):
-        read(path)
+        read_sweep(path)

@@ -15,7 +15,7 @@ import dmoc
 from dmoc.cli.app import main
 from dmoc.scene.problem_file import load_problem
 from dmoc.sweeps import sweep as sweeping
-from dmoc.sweeps.data import COLUMNS, is_sweep, read, result
+from dmoc.sweeps.data import COLUMNS, is_sweep, read_sweep, result
 from dmoc.sweeps.journal import journal_of
 from dmoc.sweeps.worker import Task, pack, solve_point, unpack
 
@@ -123,7 +123,7 @@ def test_the_file_has_what_was_swept_as_dimensions_and_failures_as_data(push, he
     data = dmoc.sweep(
         push, {"mass": [1, 4], "duration": "2,4"}, "out.nc", order=4, steps=8, settings={"limit": 3.0}
     )
-    held = read("out.nc")
+    held = read_sweep("out.nc")
     assert is_sweep("out.nc") and held.identical(data) and not journal_of("out.nc").exists()
     assert dict(held.sizes) == {"mass": 2, "duration": 2}
     assert (held.mass.attrs["units"], held.duration.attrs["units"]) == ("kg", "s")
@@ -154,7 +154,7 @@ def test_a_sample_has_its_points_along_one_dimension(push, here):
 def test_a_failed_check_is_named_and_exits_4(here, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run("sweep", "orbit_raise", "--vary", "mass=1,2", "--steps", 12, "--out", "out.nc") == 4
-    data = read("out.nc")
+    data = read_sweep("out.nc")
     assert data.success.all() and not data.checks_hold.any()
     assert set(data.failed_check.values) <= {"reference", "ledger", "stability"} and (data.failed_by > 1).all()
 
@@ -242,7 +242,7 @@ def test_a_killed_sweep_goes_on_where_it_was_and_ends_the_same(push):
     # the last call is before the last solve
     assert len(made(push)) - before == tries[-1][1] - kept
     whole = dmoc.sweep(push, out="whole.nc", **arguments)
-    assert same(data, whole) and same(read("out.nc"), read("whole.nc"))
+    assert same(data, whole) and same(read_sweep("out.nc"), read_sweep("whole.nc"))
 
 
 def test_ctrl_c_keeps_the_journal_and_says_how_to_go_on(push):
@@ -303,7 +303,7 @@ def test_a_worker_of_a_scheduler_that_dies_loses_its_point_alone(push, cluster):
 
 def test_a_scheduler_that_is_not_there_is_one_line(push, monkeypatch, capfd):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("dmoc.sweeps.pool.PATIENCE_S", 0.5)
+    monkeypatch.setattr("dmoc.sweeps.pool.ANSWER_WITHIN_S", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense"):
         assert run("sweep", push, "--vary", "mass=1,2", "--out", "out.nc", "--scheduler", address) == 2
         err = capfd.readouterr().err
@@ -330,7 +330,7 @@ def test_killed_again_and_again_it_ends_the_same(push):
             break
     settings = {"nap": 0.15}
     whole = dmoc.sweep(push, {"mass": "1:6:6"}, "whole.nc", steps=8, settings=settings)
-    assert same(read("out.nc"), whole)
+    assert same(read_sweep("out.nc"), whole)
 
 
 @pytest.mark.slow

@@ -1,0 +1,82 @@
+"""`dmoc solve`: solve, check, save, draw, show."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dmoc.cli.options import (
+    Hold,
+    Json,
+    Name,
+    Order,
+    Quiet,
+    Settings,
+    Steps,
+    best_start,
+    ends_at_once,
+    problem_of,
+    show_answer,
+    switch,
+    watched,
+    writable,
+)
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+
+def solve(
+    name: Name,
+    order: Order = None,
+    steps: Steps = None,
+    tol: Annotated[
+        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
+    ] = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
+    starts: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
+        ),
+    ] = 1,
+    as_json: Json = False,
+    compiled: Annotated[
+        bool,
+        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve a problem, check the answer, show both."""
+    import dmoc
+
+    writable(out)
+    writable(plot, drawn=True)
+    # what a problem file prints must not come between the lines of the JSON object
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+        file, problem = problem_of(name, settings)
+        start: Any = None if guess is None else dmoc.load(guess)
+        unit = problem.objective.unit_with(problem.actuator)
+        if starts > 1:
+            start = best_start(problem, starts, order, hold, start, None if as_json or quiet else unit)
+        with watched(as_json or quiet, unit) as progress:
+            solution = dmoc.solve(
+                problem, order, steps, tol, hold, guess=start, progress=progress, compiled=compiled
+            )
+        from dmoc.checks.verification import verify
+
+        verdict = verify(solution) if solution.success else None
+    if out is not None:
+        solution.save(out, source_hash=file.source_hash)
+    if plot is not None:
+        from dmoc.plots.page import save_figure
+
+        save_figure(solution, plot, verdict)
+    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
