@@ -65,6 +65,10 @@ class Scheme:
         """The s Gauss points of the step, where the velocity of the interpolant is most accurate."""
         return 0.5 * (legendre.leggauss(self.degree)[0] + 1)
 
+    def gauss_weights(self) -> np.ndarray:
+        """The weights of the Gauss points, which add up to 1."""
+        return 0.5 * legendre.leggauss(self.degree)[1]
+
 
 def scheme(order: int) -> Scheme:
     """The scheme of order 2, 4, 6 or 8.

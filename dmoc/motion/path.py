@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dmoc.basics.numerics import cubic_spline
-from dmoc.motion.lobatto import scheme
+from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
 
 
@@ -31,6 +31,8 @@ class Key(NamedTuple):
         return cls(*text.split(":", 2))
 
 
+# The group of rows for the masses at the inner nodes of steps.
+INNER_MASSES = "mass_inside"
 # Multipliers of the discrete Euler-Lagrange equations: the costates.
 COSTATE = Key("smooth", "row", "dynamics")
 # Multipliers of the rows that tie an actuator's controls together, and of the bounds on positions.
@@ -101,14 +103,51 @@ class DiscretePath:
             position=position,
             control=_between(old_control, self.control, new_control),
             mass=np.interp(new, old, self.mass),
-            multipliers={key: _carry(key.kind, value, places) for key, value in self.multipliers.items()},
+            multipliers=self._carried(mesh, order, places),
         )
 
+    def _carried(self, mesh: np.ndarray, order: int, places: dict) -> dict[Key, np.ndarray]:
+        """The multipliers on another mesh and order."""
+        found = {}
+        for key, value in self.multipliers.items():
+            if key.kind == "smooth":
+                found[key] = cubic_spline(places["node"][0], value)(places["node"][1])
+            elif key.kind == "step" and order != self.order:
+                found[key] = _within_steps(key, value, (self.mesh, scheme(self.order)), (mesh, scheme(order)))
+            elif key.kind in places:
+                found[key] = _between(places[key.kind][0], value, places[key.kind][1])
+            else:
+                found[key] = value
+        return {key: value for key, value in found.items() if value.size}
 
-def _carry(kind: str, value: np.ndarray, places: dict) -> np.ndarray:
-    if kind == "smooth":
-        return cubic_spline(places["node"][0], value)(places["node"][1])
-    return _between(places[kind][0], value, places[kind][1]) if kind in places else value
+
+def _within_steps(
+    key: Key, value: np.ndarray, old: tuple[np.ndarray, Scheme], new: tuple[np.ndarray, Scheme]
+) -> np.ndarray:
+    """Multipliers of rows that stand within steps, whose number depends on the order, at another order.
+
+    Rows are at the inner nodes of a step (masses) or at its Gauss points (limits on the speed). What is
+    carried is the density, a multiplier over the weight of its point.
+    """
+    (old_mesh, before), (new_mesh, after) = old, new
+    points, weights = zip(*(_points_within(key, rule) for rule in (before, after)), strict=True)
+    steps, rows = len(value), value.shape[1] // max(len(points[0]), 1)
+    if not rows or not len(points[1]):
+        return np.empty((len(new_mesh) - 1, 0))
+    density = value.reshape(steps, -1, rows) / weights[0][:, None]
+    at = [
+        (mesh[:-1, None] + np.diff(mesh)[:, None] * inner).ravel()
+        for mesh, inner in zip((old_mesh, new_mesh), points, strict=True)
+    ]
+    moved = _between(at[0], density.reshape(-1, rows), at[1]).reshape(len(new_mesh) - 1, -1, rows)
+    return (moved * weights[1][:, None]).reshape(len(new_mesh) - 1, -1)
+
+
+def _points_within(key: Key, rule: Scheme) -> tuple[np.ndarray, np.ndarray]:
+    """Places of rows within a step of length 1, and their weights."""
+    if key.group == INNER_MASSES:
+        return rule.points[1:-1], rule.weights[1:-1]
+    return rule.gauss_points(), rule.gauss_weights()
 
 
 def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray:

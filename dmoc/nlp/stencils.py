@@ -19,6 +19,7 @@ import casadi as ca
 from dmoc.basics.memory import remembered
 from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
+from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.assembly import Kernel, kernel
 from dmoc.nlp.layout import Owner
@@ -186,7 +187,7 @@ class _Writer:
             for i in range(1, len(matrix))
         ]
         draft.limit("mass_flow", "between", [rows[-1]._replace(name="")])
-        draft.limit("mass_inside", "step", rows[:-1])
+        draft.limit(INNER_MASSES, "step", rows[:-1])
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
