@@ -3,9 +3,9 @@
     ./scripts/run python scripts/accuracy.py
 
 Under three minutes. A cell is the time from a problem to an objective with that relative error, build and
-solve, with the meshes interpolated. Every solve writes its functions down anew, as the very first one of a
-scene does; "solved before" is one in a new process, which finds them in dmoc's cache. Optima are those of
-`references.py`. The methods of `alternatives.py` know fixed durations without constraints or engines alone.
+solve, with the meshes interpolated. Every solve writes its functions down anew, as the first one of a scene in
+a process does. Optima are those of `references.py`. The methods of `alternatives.py` know fixed durations
+without constraints or engines alone.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import argparse
 import os
 import platform
 import re
-import tempfile
 import time
 from functools import partial
 from pathlib import Path
@@ -24,7 +23,7 @@ from alternatives import METHODS, radau
 from references import TABLE
 
 from dmoc import solve
-from dmoc.basics.memory import forget, store
+from dmoc.basics.memory import forget
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import TARGETS, time_to_reach, work_precision
@@ -57,8 +56,6 @@ PROBLEMS = {
     "lunar_landing": (SWITCHING, {}, 1e-9),
     "two_body_fuel": ({"order 2": (50, 200, 800), "order 4": (25, 100, 400)}, {}, 1e-5),
 }
-# Where writing functions down is next to nothing.
-SLOW = ("earth_mars", "two_body_fuel")
 
 
 def optimum(name: str) -> float:
@@ -104,13 +101,11 @@ def rows(name: str) -> list[str]:
     trials = work_precision(problem, orders, meshes | by_hand, REPEATS, others, best)
     times = time_to_reach(trials, TARGETS)
     own = {title: times[title] for title in meshes}
-    lines = {"best order": cheapest(own)}
-    if name not in SLOW:
-        store()
-        again = work_precision(problem, orders, meshes, REPEATS, (), best, before=partial(forget, files=True))
-        lines["solved before"] = cheapest(time_to_reach(again, TARGETS))
-    lines["order 2"] = [shown(seconds) for seconds in own["order 2"]]
-    lines["`--tol` (true error)"] = asked_for(problem, best, tightest)
+    lines = {
+        "best order": cheapest(own),
+        "order 2": [shown(seconds) for seconds in own["order 2"]],
+        "`--tol` (true error)": asked_for(problem, best, tightest),
+    }
     if by_hand:
         lines["by hand"] = cheapest({title: times[title] for title in by_hand})
     heads = [f"`{name}`", *[""] * (len(lines) - 1)]
@@ -125,16 +120,13 @@ def main() -> None:
     parser.add_argument("--readme", action="store_true", help="write the table into the README")
     into_readme, begun, text = parser.parse_args().readme, time.perf_counter(), HEAD
     print(HEAD, end="")
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_CACHE_HOME"] = folder
-        for name in PROBLEMS:
-            found = "".join(rows(name))
-            print(found, end="", flush=True)
-            text += found
-        store()
+    for name in PROBLEMS:
+        found = "".join(rows(name))
+        print(found, end="", flush=True)
+        text += found
     machine = f"{os.cpu_count()} shared cores, {platform.machine()}, Python {platform.python_version()}"
-    note = f"\nMedians of {REPEATS} on {machine}; {time.perf_counter() - begun:.0f} s in all.\n"
-    print(note, end="")
+    note = f"\nMedians of {REPEATS} on {machine}.\n"
+    print(f"{note}{time.perf_counter() - begun:.0f} s in all")
     if into_readme:
         README.write_text(PLACE.sub(lambda _: text + note, README.read_text()))
 

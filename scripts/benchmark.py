@@ -4,9 +4,9 @@
     ./scripts/run python scripts/benchmark.py --json out.json --largest 100000
 
 Ratios are between medians of runs that take turns, so that whatever else the computer does falls on both
-alike. Iterations and evaluations stand beside the seconds: they do not depend on the computer. dmoc keeps
-the functions it writes down for a scene, so its times are three: of the very first solve, of one in a new
-process, which finds them in its cache, and of another one in the same process.
+alike. Iterations and evaluations stand beside the seconds: they do not depend on the computer. dmoc remembers
+the functions it writes down for a scene, so its times are two: of the first solve in a process, and of another
+one in the same process.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -37,7 +35,6 @@ from benchmark_report import (
     verdicts,
 )
 
-import dmoc.basics.memory
 from dmoc import BallForce, PointGravity, State, TransferProblem, solve, verify
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
@@ -48,12 +45,8 @@ from dmoc.studies.accuracy import Trial, time_to_reach, work_precision
 
 OPTIMA = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3, "K1": 0.010173701094176}
 TARGET = 1e-6
-# What a solve finds of those before it.
-STATES: dict[str, Callable[[], None]] = {
-    "first": dmoc.basics.memory.forget,
-    "new process": partial(dmoc.basics.memory.forget, files=True),
-    "same process": lambda: None,
-}
+# Whether the same process has solved the scene before.
+STATES = {"first": False, "same process": True}
 ORDERS = {"order 2": 2, "order 4": 4, "order 6": 6, "order 8": 8}
 OTHERS = METHODS | {f"Radau {d}": partial(radau, degree=d) for d in (2, 3, 4, 5, 7)}
 ORDERS |= {"plain": 2, "trapezoid": 2, "RK4 shooting, held": 2, "RK4 shooting": 4, "Hermite-Simpson": 4}
@@ -81,20 +74,13 @@ def against_plain(steps: int, repeats: int) -> dict[str, Any]:
     """Coarse to fine with assembled derivatives against eq. (16) written down: the same discrete optimum."""
     problem = load_problem("orbit_raise").make()
     given = problem, (2,), (steps,), repeats, {"plain": METHODS["plain"]}, OPTIMA["orbit_raise"]
-    found = {state: work_precision(*given, before=before) for state, before in _states()}
+    found = {state: work_precision(*given, solved_before=before) for state, before in STATES.items()}
     return {
         "steps": steps,
         "dmoc": {state: _facts(ours) for state, (ours, _) in found.items()},
         "plain": _facts(found["first"][1]),
         "ratio": {state: theirs.seconds / ours.seconds for state, (ours, theirs) in found.items()},
     }
-
-
-def _states() -> Iterator[tuple[str, Callable[[], None]]]:
-    """What is called before each solve; the cache is filled once the first solves have been seen."""
-    for state, before in STATES.items():
-        yield state, before
-        dmoc.basics.memory.store()
 
 
 def _facts(trial: Trial) -> dict[str, Any]:
@@ -166,7 +152,7 @@ def equal_error(name: str, problem: TransferProblem) -> dict[str, Any]:
         for method, (found,) in time_to_reach(trials, (TARGET,)).items()
     }
     own = {method: counts for method, counts in few.items() if method.startswith("order ")}
-    for state, before in _states():
+    for state, before in STATES.items():
         again = time_to_reach(_some(problem, own, 7, optimum, before), (TARGET,))
         for method, (found,) in again.items():
             rows[method]["seconds"][state] = found
@@ -182,11 +168,11 @@ def _some(
     meshes: dict[str, list[int]],
     repeats: int,
     optimum: float,
-    before: Callable[[], None] = dmoc.basics.memory.forget,
+    solved_before: bool = False,
 ) -> list[Trial]:
     orders = [ORDERS[method] for method in meshes if method.startswith("order ")]
     others = {method: OTHERS[method] for method in meshes if method in OTHERS}
-    return work_precision(problem, orders, meshes, repeats, others, optimum, before=before)
+    return work_precision(problem, orders, meshes, repeats, others, optimum, solved_before=solved_before)
 
 
 # --- where the time goes ----------------------------------------------------------------------------------
@@ -256,10 +242,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures here")
     parser.add_argument("--largest", type=int, default=25_600, help="most steps to take apart (100000: slow)")
     given, begun = parser.parse_args(), time.perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_CACHE_HOME"] = folder
-        results = measure(given.largest)
-        dmoc.basics.memory.store()
+    results = measure(given.largest)
     console.print(f"\n{time.perf_counter() - begun:.0f} s")
     if given.json is not None:
         given.json.write_text(json.dumps(results, indent=2))

@@ -1,24 +1,25 @@
 """Functions as machine code, made by the computer's C compiler and kept for the next time.
 
 They are those of one node or one step: neither their source nor the time to compile it grows with the
-mesh. A library is named by its source and kept in the user's own folder (`cache`); it is loaded only if
-its content is what was compiled. Without a compiler, or with anything else amiss, functions stay as they
-are: CasADi interprets them, with the same result to rounding.
+mesh. A library is named by its source and kept in a folder of the user's own, `dmoc` in $XDG_CACHE_HOME or
+~/.cache, which may be removed at any time. It is loaded only if nobody else may write to it or to the
+folder, and its content is what was compiled. Without a compiler, or with anything else amiss, functions
+stay as they are: CasADi interprets them, with the same result to rounding.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import casadi as ca
-
-from dmoc.basics.cache import folder
 
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-O1", "-fPIC", "-shared")
@@ -44,6 +45,28 @@ def compiler() -> str | None:
     return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
+def folder() -> str | None:
+    """The user's folder for libraries; None where it cannot be made or others may write to it."""
+    # by its specification a path that is not absolute does not count
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    place = os.path.join(given if os.path.isabs(given) else os.path.expanduser("~/.cache"), "dmoc")
+    try:
+        if not os.path.isabs(place):  # a user without a home
+            return None
+        if not os.path.lexists(place):
+            os.makedirs(place, mode=0o700, exist_ok=True)
+        found = os.lstat(place)
+    except OSError:
+        return None
+    return place if stat.S_ISDIR(found.st_mode) and _is_private(found) else None
+
+
+def _is_private(found: os.stat_result) -> bool:
+    """Whether a file or folder is this user's or root's, and nobody else may write to it."""
+    own = hasattr(os, "geteuid") and found.st_uid in (os.geteuid(), 0)
+    return own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
 def _library(functions: list[ca.Function]) -> Path | None:
     """The library of some functions, compiled if there is none that is intact."""
     place = folder()
@@ -63,8 +86,11 @@ def _record(library: Path) -> Path:
 
 
 def _intact(library: Path) -> bool:
-    """Whether a library is there as it was compiled."""
+    """Whether a library is there as it was compiled, in a file of its own that nobody else may write to."""
     try:
+        found = os.lstat(library)  # of a link itself, wherever it leads
+        if not (stat.S_ISREG(found.st_mode) and _is_private(found)):
+            return False
         return hashlib.sha256(library.read_bytes()).hexdigest() == _record(library).read_text()
     except (OSError, UnicodeDecodeError):
         return False
@@ -81,12 +107,19 @@ def _compile(source: str, library: Path) -> bool:
             code.write_text(source)
             command = [program, *FLAGS, str(code), "-lm", "-o", str(made)]
             subprocess.run(command, check=True, capture_output=True, timeout=PATIENCE_S)
+            # where a umask lets the group write, the library would not be loaded
+            made.chmod(0o600)
             record.write_text(hashlib.sha256(made.read_bytes()).hexdigest())
             made.replace(library)
             record.replace(_record(library))
-            for old in sorted(library.parent.glob("*.so"), key=lambda file: -file.stat().st_mtime)[MOST_KEPT:]:
-                old.unlink(missing_ok=True)
-                _record(old).unlink(missing_ok=True)
+        _tidy(library.parent)
     except (OSError, subprocess.SubprocessError):
         return False
     return True
+
+
+def _tidy(place: Path) -> None:
+    """Remove the oldest libraries beyond a number."""
+    for old in sorted(place.glob("*.so"), key=lambda file: -file.stat().st_mtime)[MOST_KEPT:]:
+        old.unlink(missing_ok=True)
+        _record(old).unlink(missing_ok=True)

@@ -9,7 +9,7 @@ over the evaluations, and nothing here knows mechanics.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -54,10 +54,6 @@ class Kernel:
     def compiled(self) -> dict[str, ca.Function]:
         """The functions as machine code where that can be had."""
         return compiled(self.functions)
-
-    def __reduce__(self) -> tuple:
-        # machine code stays where it is
-        return Kernel, tuple(getattr(self, field.name) for field in fields(self))
 
 
 def kernel(name: str, variables: ca.SX, data: ca.SX, parameters: ca.SX, rows: ca.SX, cost: ca.SX) -> Kernel:

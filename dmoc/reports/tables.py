@@ -86,7 +86,7 @@ def findings_table(found: Findings) -> RenderableType:
             ("system", f"{found.system}, {found.cores} cores that may be used"),
             ("linear solvers", [f"{', '.join(works) or 'none'} in Ipopt", f"not here: {', '.join(fails)}"]),
             ("C compiler", found.compiler or "none found; only --compiled and code from dmoc export need one"),
-            ("cache", found.cache or "none: no folder that you alone may write to"),
+            ("machine code", found.folder or "not kept: no folder that you alone may write to"),
             ("orbit_raise", milliseconds),
         ]
     )

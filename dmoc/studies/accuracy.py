@@ -96,7 +96,7 @@ def work_precision(
     cold: bool = False,
     compiled: bool = False,
     progress: Callable[[str], None] | None = None,
-    before: Callable[[], None] = forget,
+    solved_before: bool = False,
 ) -> list[Trial]:
     """Solve a problem at several orders on several meshes, and measure error and time.
 
@@ -123,9 +123,9 @@ def work_precision(
         Also solve each with functions as machine code, see `solve`.
     progress : callable
         Called before every solve with what it is.
-    before : callable
-        Called before every solve, not timed. By default dmoc forgets the functions it has written down:
-        each solve is timed as the first one ever of its scene.
+    solved_before : bool
+        Time each solve as one of a scene that this process has solved before: all are solved once more
+        first, not timed. By default dmoc forgets the functions it has written down before each.
 
     Returns
     -------
@@ -156,18 +156,22 @@ def work_precision(
         for count in counts
     ]
     value, doubt = best_known(problem) if reference is None else (number("reference", reference, ""), 1e-16)
-    rounds = [[_told(progress, labels, before, run) for labels, run in runs] for _ in range(repeats)]
+    untimed = int(solved_before)
+    rounds = [
+        [_told(progress, labels, solved_before, run) for labels, run in runs] for _ in range(untimed + repeats)
+    ]
     scales = path_scales(starting_guess(problem, uniform_mesh(100), 2, False))
     return [
         _trial(problem, labels, timed, (value, doubt), scales)
-        for (labels, _), timed in zip(runs, zip(*rounds, strict=True), strict=True)
+        for (labels, _), timed in zip(runs, zip(*rounds[untimed:], strict=True), strict=True)
     ]
 
 
-def _told(progress: Callable[[str], None] | None, labels: tuple, before: Callable, run: Callable) -> Run:
+def _told(progress: Callable[[str], None] | None, labels: tuple, solved_before: bool, run: Callable) -> Run:
     if progress is not None:
         progress(f"{labels[0]}, {labels[2]} steps")
-    before()
+    if not solved_before:
+        forget()
     return run()
 
 

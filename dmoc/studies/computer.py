@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
-from dmoc.basics import cache
-from dmoc.basics.compiled import compiler
+from dmoc.basics.compiled import compiler, folder
 from dmoc.basics.memory import forget
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.solve import solve
@@ -57,13 +56,13 @@ class Timing:
 
 @dataclass(frozen=True)
 class Findings:
-    """What `examine` found; `compiler` and the folder `cache` are None where there is none."""
+    """What `examine` found; `compiler` and `folder`, that of machine code, are None where there is none."""
 
     versions: dict[str, str]
     system: str
     cores: int
     compiler: str | None
-    cache: str | None
+    folder: str | None
     linear_solvers: tuple[Linear, ...]
     timings: tuple[Timing, ...]
 
@@ -79,7 +78,7 @@ def examine(seconds: float = 5.0) -> Findings:
         system=f"{platform.system()} {platform.machine()}",
         cores=usable_cores(),
         compiler=compiler(),
-        cache=cache.folder(),
+        folder=folder(),
         linear_solvers=solvers,
         timings=tuple(benchmark(order, steps, share) for order, steps in MESHES) if seconds else (),
     )

@@ -1,5 +1,8 @@
-"""Functions are kept for the same scene alone: whatever a user makes of its parts, none gets another one's."""
+"""Functions are remembered for the same scene alone: whatever a user makes of it, none gets another one's."""
 
+import os
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -27,11 +30,15 @@ from dmoc import (
     TransferProblem,
     Wind,
     circular_motion,
+    solve,
     tabulated_motion,
+    verify,
 )
-from dmoc.basics.memory import identity, remembered
+from dmoc.basics import memory
+from dmoc.basics.memory import forget, identity, remembered
 from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.stencils import formulas_of
+from dmoc.scene.problem_file import load_problem
 
 
 class Near(NamedTuple):
@@ -166,6 +173,53 @@ def test_scenes_that_differ_in_one_part_never_share_functions(part):
         np.testing.assert_array_equal(found, again[name])
         for other, theirs in first.items():
             assert name == other or not np.array_equal(found, theirs), f"{name} has the functions of {other}"
+
+
+def must_not_be_made():
+    raise AssertionError("made again")
+
+
+@pytest.mark.parametrize("name", ["orbit_raise", "leo_raise", "drone_hop", "hovercraft", "formation"])
+def test_another_solve_makes_nothing_anew_and_has_the_same_answer(name):
+    problem = load_problem(name).make()
+    forget()
+    first = solve(problem, order=4, steps=20)
+    verify(first)
+    before = dict(memory._known)
+    assert before
+    again = solve(load_problem(name).make(), order=4, steps=20)
+    verify(again)
+    assert again.iterations == first.iterations
+    np.testing.assert_array_equal(again.position, first.position)
+    assert {key: id(value) for key, value in memory._known.items()} == {k: id(v) for k, v in before.items()}
+
+
+def test_what_measures_starts_anew():
+    assert remembered(lambda: "made", "test") == "made"
+    assert remembered(must_not_be_made, "test") == "made"
+    forget()
+    assert remembered(lambda: "made anew", "test") == "made anew"
+
+
+def test_those_used_last_are_remembered(monkeypatch):
+    monkeypatch.setattr(memory, "MOST", 3)
+    forget()
+    for i in range(3):
+        remembered(lambda: "made", "test", i)
+    remembered(must_not_be_made, "test", 0)
+    remembered(lambda: "made", "test", 3)
+    for i in (0, 2, 3):
+        assert remembered(must_not_be_made, "test", i) == "made"
+    assert remembered(lambda: "made anew", "test", 1) == "made anew"
+
+
+def test_a_process_leaves_no_functions_behind(tmp_path):
+    """A later one would have to trust them: whoever can write there could let it run anything."""
+    code = "from dmoc import solve; from dmoc.scene.problem_file import load_problem; "
+    code += "solve(load_problem('orbit_raise').make(), steps=10)"
+    places = dict.fromkeys(("HOME", "XDG_CACHE_HOME", "TMPDIR"), str(tmp_path))
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, env=os.environ | places)
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_may_change_without_a_rebuild_shares_functions():

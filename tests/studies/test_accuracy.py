@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dmoc import PointGravity, Spring, State, TransferProblem, solve
+from dmoc.basics.memory import remembered
 from dmoc.cli.app import main
 from dmoc.plots.study import save_study
 from dmoc.scene.problem_file import load_problem
@@ -71,6 +72,17 @@ def test_cold_solves_stand_beside_those_from_coarse_meshes():
     warm, cold = work_precision(load_problem("orbit_raise").make(), (2,), (400,), repeats=1, cold=True)
     assert (warm.coarse_to_fine, cold.coarse_to_fine) == (True, False)
     assert cold.method == "order 2, cold" and cold.objective == pytest.approx(warm.objective, rel=1e-8)
+
+
+@pytest.mark.parametrize("solved_before", [False, True])
+def test_a_solve_is_timed_as_the_first_of_its_scene_or_as_another_one(solved_before):
+    marks = []
+    given = load_problem("orbit_raise").make(), (2,), (20,), 2, (), 1.0
+    told = {"progress": lambda words: marks.append(remembered(object, "a mark"))}
+    work_precision(*given, **told, solved_before=solved_before)
+    # before each solve all is forgotten, or one more comes first that is not timed
+    assert len(marks) == (3 if solved_before else 2)
+    assert len(set(map(id, marks))) == (1 if solved_before else 2)
 
 
 def test_a_mesh_beyond_the_limit_of_stability_is_a_row_too():

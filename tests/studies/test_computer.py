@@ -20,7 +20,7 @@ def test_the_table_names_everything(capsys):
     assert [solver.name for solver in found.linear_solvers] == list(LINEAR_SOLVERS)
     console().print(findings_table(found))
     shown = capsys.readouterr().out
-    for word in ("casadi 3.", "ipopt 3.", "MUMPS", "C compiler", "cores", "cache"):
+    for word in ("casadi 3.", "ipopt 3.", "MUMPS", "C compiler", "cores", "machine code"):
         assert word in shown
 
 
