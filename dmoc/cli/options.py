@@ -165,13 +165,13 @@ def show_answer(
     else:
         from dmoc.reports import words as report
 
-        if solution.success and verdict is not None:
+        if solution.optimal and verdict is not None:
             report.console().print(report.answer(solution, verdict, quiet, written))
         else:
             report.console().print(report.failure(solution, quiet, written))
-    if not solution.success:
+    if not solution.optimal:
         raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
-    raise typer.Exit(SOLVED if verdict is not None and verdict.ok else CHECK_FAILED)
+    raise typer.Exit(SOLVED if solution.success and verdict is not None and verdict.ok else CHECK_FAILED)
 
 
 def warn(message: str) -> None:

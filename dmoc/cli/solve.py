@@ -72,7 +72,7 @@ def solve(
             )
         from dmoc.checks.verification import verify
 
-        verdict = verify(solution) if solution.success else None
+        verdict = verify(solution) if solution.optimal else None
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
     if plot is not None:

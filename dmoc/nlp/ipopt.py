@@ -48,6 +48,9 @@ STATUSES = {
         ("Diverging_Iterates",), "the objective has no lower bound here; limit the force or the duration"
     ),
     "stopped": Status(("User_Requested_Stop",), "interrupted; the best iterate is kept"),
+    "tolerance not met": Status(
+        (), "give steps to begin with, another order, or a looser tolerance; the answer is kept as it is"
+    ),
     "failed": Status((), "try another number of steps, another order, hold=True, or another guess"),
 }
 _STATUS_OF = {code: name for name, status in STATUSES.items() for code in status.codes}

@@ -104,7 +104,7 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
             panel.set_xlabel(f"time [{unit}]")
         if not wide:
             page.align_ylabels(panels)
-        page.suptitle(_headline(solution, *time_axis), fontsize=16, color=DARK if solution.success else WARNING)
+        page.suptitle(_headline(solution, *time_axis), fontsize=16, color=DARK if solution.optimal else WARNING)
         words, good = _footnote(solution, report)
         page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
     return page
@@ -189,7 +189,7 @@ def _headline(solution: Solution, late: float, late_unit: str) -> str:
     """What was found, with times in the unit of the time axis."""
     about, problem = solution.provenance, solution.problem
     name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
-    if not solution.success:
+    if not solution.optimal:
         return f"{name}NOT SOLVED ({solution.status}), the last iterate"
     kind = "objective" if problem is None else _wanted(problem.objective)
     size, unit = (late, late_unit) if about.objective_unit == "s" else (1.0, about.objective_unit)

@@ -14,6 +14,9 @@ from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
 
+# Status of a local optimum that is not as accurate as it was asked to be.
+NOT_MET = "tolerance not met"
+
 
 class SolveError(RuntimeError):
     """Raised by `Solution.raise_for_status` when the optimisation failed."""
@@ -37,6 +40,8 @@ class Solution:
         At the step ends, from the discrete Legendre transforms [m/s]; momentum is per unit mass.
     costate : array, shape (nodes, axes)
         Multipliers of the discrete Euler-Lagrange equations [unit of the objective per m/s].
+    success : bool
+        Whether what was asked for was found: a local optimum, to the tolerance if one was given.
     status, message : str
         What the solver said, and what to try if it failed.
     ladder : tuple of Level
@@ -63,6 +68,11 @@ class Solution:
     error: Error | None = None
     reason: str = ""
     provenance: Provenance = field(kw_only=True)
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the path is a local optimum, be it as accurate as asked for or not."""
+        return self.success or self.status == NOT_MET
 
     @property
     def order(self) -> int:

@@ -171,8 +171,14 @@ class Ladder:
         if watch.error is not None:
             raise watch.error
         level = nlp.level(answer, built)
-        self._rungs.append(Rung(len(self._rungs), self.problem, nlp, answer, level))
+        self._rungs.append(Rung(len(self._rungs), self._asked(problem), nlp, answer, level))
         return self._rungs[-1]
+
+    def _asked(self, problem: TransferProblem) -> TransferProblem:
+        """The problem that an attempt answers: as asked for, or with |F| rounded less."""
+        asked, used = self.problem.actuator.smoothing, problem.actuator.smoothing
+        sharper = asked is not None and used is not None and used < asked
+        return replace(self.problem, actuator=problem.actuator) if sharper else self.problem
 
     def _rounded(self, rounding: float | None) -> TransferProblem:
         """The problem with this rounding of |F| at zero."""
@@ -187,5 +193,5 @@ class Ladder:
         levels = tuple(replace(one.level, error=known.get(one.number)) for one in self._rungs)
         reason = "" if rung.cause is None else rung.cause.words()
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
-        worst = () if rung.solved else worst_in_units(rung.nlp, self.problem, rung.answer.x, rung.answer.g)
-        return rung.nlp.solution(self.problem, rung.answer, levels, message, self.options, worst=worst, **found)
+        worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
+        return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, worst=worst, **found)

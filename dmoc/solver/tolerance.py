@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
+from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.facts import Error
-from dmoc.results.solution import Solution
+from dmoc.results.solution import NOT_MET, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.estimate import TINY, change, estimate, local_errors, rounding_cost
 from dmoc.solver.ladder import Ladder, Rung
@@ -24,6 +25,10 @@ MOST_MESHES = 14
 PARTS = 4
 # No step becomes shorter than this part of the duration.
 SHORTEST = 1e-5
+# The rounding of |F| may cost this part of the tolerance.
+ROUNDING_SHARE = 0.5
+# |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
+LEAST_ROUNDING = 1e-8
 # More switches than this are not listed.
 MOST_SWITCHES = 12
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
@@ -66,17 +71,13 @@ class _Refinement:
     """The meshes after the first, each a refinement of the one before, and the best answer so far."""
 
     def __init__(self, ladder: Ladder, tol: float, local: bool, reason: str):
-        self.ladder, self.problem, self.tol, self.local, self.reason = (
-            ladder,
-            ladder.problem,
-            tol,
-            local,
-            reason,
-        )
+        self.ladder, self.problem, self.tol = ladder, ladder.problem, tol
+        self.local, self.reason = local, reason
         self.changes: list[tuple[float, float]] = []
         self.errors: dict[int, float] = {}
         self.best: _Found | None = None
         self.worse = 0
+        self.rounded = 0.0
 
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
@@ -92,6 +93,8 @@ class _Refinement:
             fine = rung.path
             self.changes.append(change((coarse, cost), (fine, rung.level.objective), parts))
             met = self._judge(rung, fine, most)
+            if met:
+                self._sharpen(rung, most)
             if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
                 return self._settled(self.reason)
             if self.worse == PATIENCE:
@@ -124,16 +127,32 @@ class _Refinement:
             self.best, self.worse = _Found(rung, found), 0
         else:
             self.worse += 1
-        if rounded > self.tol and (met or len(self.changes) == MOST_MESHES):
-            self.reason += f"; the rounding of |F| costs {rounded:.1e}, less with a smaller Engine(smoothing)"
+        self.rounded = rounded
         return met
+
+    def _sharpen(self, rung: Rung, most: float) -> None:
+        """Where the rounding of |F| alone costs more than the tolerance, round it less on the same mesh."""
+        width = self.problem.actuator.smoothing
+        while width is not None and self.rounded > ROUNDING_SHARE * self.tol and width > LEAST_ROUNDING:
+            width = max(width * max(0.5 * ROUNDING_SHARE * self.tol / self.rounded, 0.1), LEAST_ROUNDING)
+            sharper = self.ladder.solve_on(rung.path, width)
+            if not sharper.solved:
+                return
+            rung, self.problem = sharper, sharper.problem
+            self._judge(rung, rung.path, most)
+            self.reason += f"; |F| rounded over {width:.0e} of the largest thrust"
 
     def _settled(self, reason: str) -> Solution:
         """The best answer that was found, which need not be the last one."""
         assert self.best is not None
         words = _words(self.problem, self.best.rung.path, reason)
         more = {"tolerance": self.tol, "error": self.best.error, "reason": words}
-        return self.ladder.solution(self.best.rung, self.errors, **more)
+        solution = self.ladder.solution(self.best.rung, self.errors, **more)
+        reached = self.best.error.largest
+        if reached <= self.tol:
+            return solution
+        told = f"the estimated error is {reached:.1e}, you asked for {self.tol:g}; {STATUSES[NOT_MET].advice}"
+        return replace(solution, success=False, status=NOT_MET, message=told)
 
 
 def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int, str]:
