@@ -15,6 +15,8 @@ __version__ = "0.1.0"
 # The one list of public names, for type checkers and editors as for Python. Python itself imports a name
 # on its first use only, so that `dmoc --help` answers before CasADi is loaded.
 if TYPE_CHECKING:
+    from dmoc.checks.evidence import Evidence as Evidence
+    from dmoc.checks.verification import Check as Check
     from dmoc.checks.verification import Report as Report
     from dmoc.checks.verification import verify as verify
     from dmoc.effects import J2 as J2

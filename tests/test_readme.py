@@ -7,52 +7,23 @@ import sys
 from pathlib import Path
 
 import pytest
+from shown import all_is_run, endings, ends_with, play, sections
 
 import dmoc
 from dmoc.scene.problem_file import catalogue
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text()
-COMMAND = r"^ {4}\./scripts/run dmoc (?P<command>[^\n]*)$"
-BLOCK = r"(?P<before>[^\n]*)\n\n```python\n(?P<source>.*?)^```$"
-
-
-def parts(text):
-    """Commands and Python blocks in their order."""
-    return [match.groupdict() for match in re.finditer(f"{COMMAND}|{BLOCK}", text, re.MULTILINE | re.DOTALL)]
-
-
-SECTIONS = {text.splitlines()[0]: text for text in re.split(r"^## ", TEXT, flags=re.MULTILINE) if parts(text)}
+SECTIONS = sections(TEXT)
 
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_what_the_readme_shows_works(section, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    names = {"__name__": "readme"}
-    for part in parts(SECTIONS[section]):
-        if part["command"]:
-            run(part["command"], tmp_path)
-            continue
-        if saved := re.search(r"Save this as `(\S+)`", part["before"]):
-            (tmp_path / saved[1]).write_text(part["source"])
-        exec(part["source"], names)
-
-
-def run(line, folder):
-    command = [sys.executable, "-m", "dmoc.cli", *shlex.split(line, comments=True)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert (ended.returncode, ended.stderr) == (0, ""), f"{line}\n{ended.stdout}{ended.stderr}"
-    for written in re.findall(r"--(?:out|plot) (\S+)", line):
-        assert (folder / written).stat().st_size > 1000, line
+    play(SECTIONS[section], tmp_path, monkeypatch)
 
 
 def test_nothing_in_the_readme_is_left_out():
-    """Every fenced block and every line with a command is a part of a section."""
-    blocks = TEXT.count("```python")
-    commands = re.findall(r"^\s*\./scripts/run\s+dmoc", TEXT, re.MULTILINE)
-    assert TEXT.count("```") == 2 * blocks
-    assert sum(len(parts(text)) for text in SECTIONS.values()) == blocks + len(commands) > 10
+    all_is_run(TEXT, least=10)
 
 
 # commands within a line of text, and why some of them are not run
@@ -94,10 +65,8 @@ def test_the_readme_names_everything_a_problem_is_made_of():
 
 
 def test_what_a_limit_too_small_ends_with():
-    command, shown = re.findall(r"`dmoc (solve [^`]+)` ends with\n\n {4}([^\n]+)", TEXT)[0]
-    command = [sys.executable, "-m", "dmoc.cli", *shlex.split(command)]
-    ended = subprocess.run(command, capture_output=True, text=True)
-    assert ended.returncode == 3 and " ".join(ended.stdout.split()).endswith(shown)
+    ((command, shown),) = endings(TEXT)
+    ends_with(command, shown)
 
 
 def test_every_file_the_readme_names_is_there():

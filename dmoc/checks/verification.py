@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import of_kind
+from dmoc.basics.arguments import entries, of_kind, short
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
@@ -39,10 +40,15 @@ class Check:
     ok: bool
     note: str = ""
 
+    @classmethod
+    def of(cls, name: str, value: float, limit: float, unit: str, note: str = "") -> Check:
+        """A verdict that holds up to the limit; a value which is not a number never passes."""
+        return cls(name, float(value), float(limit), unit, bool(value <= limit), note)
+
 
 @dataclass(frozen=True)
 class Report:
-    """The checks of one solution: residual, rollout, reference, ledger, bounds, optimality, stability."""
+    """The checks of one solution: those of `verify`, then those of the user's own."""
 
     checks: tuple[Check, ...]
     seconds: float
@@ -56,7 +62,11 @@ class Report:
         return next(check for check in self.checks if check.name == name)
 
 
-def verify(solution: Solution, problem: TransferProblem | None = None) -> Report:
+def verify(
+    solution: Solution,
+    problem: TransferProblem | None = None,
+    more: Sequence[Callable[[Evidence], Check]] = (),
+) -> Report:
     """Check a solution: nothing here uses what the optimiser said of it.
 
     Parameters
@@ -64,6 +74,8 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
     solution : Solution
     problem : TransferProblem, optional
         The problem it answers, if it is not the solution's own.
+    more : sequence of functions
+        Checks of your own: each takes the `Evidence` and gives a `Check`, best by `Check.of`.
 
     Returns
     -------
@@ -82,7 +94,8 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
     Raises
     ------
     ValueError
-        If the solution has no problem and none is given, or one that does not fit it.
+        If the solution has no problem and none is given, or one that does not fit it; if one of `more`
+        gives no `Check`, or one whose name is taken.
     """
     of_kind("solution", solution, Solution)
     if problem is not None:
@@ -91,18 +104,25 @@ def verify(solution: Solution, problem: TransferProblem | None = None) -> Report
     with np.errstate(all="ignore"):
         evidence = Evidence(solution)
         undefined = evidence.undefined()
+        wanted = [*CHECKS.items(), *_own(more)]
         checks = tuple(
             Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
             if undefined
-            else check(evidence)
-            for name, check in CHECKS.items()
+            else of_kind(f"what the check {name!r} gives", check(evidence), Check)
+            for name, check in wanted
         )
+    names = [check.name for check in checks]
+    if not undefined and (twice := {name for name in names if names.count(name) > 1}):
+        raise ValueError(f"more has a check of a name that is taken: {', '.join(sorted(twice))}")
     return Report(checks, time.perf_counter() - begun)
 
 
-def _check(name: str, value: float, limit: float, unit: str, note: str) -> Check:
-    """A verdict that a value which is not a number never passes."""
-    return Check(name, float(value), float(limit), unit, bool(value <= limit), note)
+def _own(more: Any) -> list[tuple[str, Callable[[Evidence], Check]]]:
+    """Checks of the user's own, by the names of their functions until they have told theirs."""
+    given = entries(more)
+    if given is None or not all(map(callable, given)):
+        raise ValueError(f"more must be functions of the evidence that give a dmoc.Check; got {short(more)}")
+    return [(getattr(check, "__name__", type(check).__name__), check) for check in given]
 
 
 def _residual(evidence: Evidence) -> Check:
@@ -126,7 +146,7 @@ def _residual(evidence: Evidence) -> Check:
     # positions are known to a rounding error of their size: no row can be better than that over h^2
     floor = evidence.mass.max() * evidence.rounding / evidence.shortest**2
     note = f"at dynamics[{node}].{'xyz'[axis]}"
-    return _check("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
+    return Check.of("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
 
 
 def _rollout(evidence: Evidence) -> Check:
@@ -142,7 +162,7 @@ def _rollout(evidence: Evidence) -> Check:
     )
     limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
     note = f"{miss:.2g} m, {slip:.2g} m/s; path amplifies errors {growth:.2g} times"
-    return _check(
+    return Check.of(
         "rollout", np.max([miss / evidence.extent, slip / evidence.speed]), limit, "of the path", note
     )
 
@@ -166,7 +186,7 @@ def _reference(evidence: Evidence) -> Check:
     q, v = reference(evidence.dynamics, evidence.path, evidence.begin, evidence.path.start_velocity)
     miss, slip = np.linalg.norm(q - evidence.position[-1]), np.linalg.norm(v - evidence.path.goal_velocity)
     note = f"misses the goal by {miss:.2g} m and {slip:.2g} m/s"
-    return _check(
+    return Check.of(
         "reference",
         np.max([miss / evidence.extent, slip / evidence.speed]),
         _accuracy(evidence),
@@ -199,8 +219,8 @@ def _ledger(evidence: Evidence) -> Check:
     if evidence.mass.min() < evidence.mass.max():
         note += f", mass to {mass:.1e}"
     if energy is not None and not energy <= accuracy:
-        return _check("ledger", energy, accuracy, "of the energy", note)
-    return _check("ledger", value, exact, "of the impulse", note)
+        return Check.of("ledger", energy, accuracy, "of the energy", note)
+    return Check.of("ledger", value, exact, "of the impulse", note)
 
 
 def _energy_gap(evidence: Evidence) -> float | None:
@@ -236,7 +256,7 @@ def _bounds(evidence: Evidence) -> Check:
     if evidence.problem.free_duration and min(below, above) < 1e-6 * longest:
         bound = "shortest" if below < above else "longest"
         note += f"; the duration sits on its {bound} limit of {evidence.path.duration:g} s"
-    return _check("bounds", worst.value, worst.allowed, worst.unit, note)
+    return Check.of("bounds", worst.value, worst.allowed, worst.unit, note)
 
 
 def _optimality(evidence: Evidence) -> Check:
@@ -246,7 +266,7 @@ def _optimality(evidence: Evidence) -> Check:
         f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "
         f"objective {left.objective:.0e}"
     )
-    return _check("optimality", left.largest, OPTIMALITY, "-", note)
+    return Check.of("optimality", left.largest, OPTIMALITY, "-", note)
 
 
 def _stability(evidence: Evidence) -> Check:
@@ -255,7 +275,7 @@ def _stability(evidence: Evidence) -> Check:
         evidence.dynamics, evidence.path, evidence.begin, evidence.velocity, evidence.matrices
     )
     note = f"h omega = {growth.frequency:.2g} at most"
-    return _check("stability", growth.value, growth.limit, "growth a step", note)
+    return Check.of("stability", growth.value, growth.limit, "growth a step", note)
 
 
 CHECKS: dict[str, Callable[[Evidence], Check]] = {

@@ -194,8 +194,13 @@ class Program:
 def _built_alike(new: Any, old: Any) -> bool:
     """Whether two parts make the same rows; a user's own may build in what it does not call adjustable."""
     structure = [(type(part), getattr(part, "structure", None)) for part in (new, old)]
-    open_to_change = type(new).__module__.startswith("dmoc.") or new.adjustable
-    return structure[0] == structure[1] and (open_to_change or _equal(new, old))
+    known = type(new).__module__.startswith("dmoc.")
+    return structure[0] == structure[1] and (known or _built_in(new) == _built_in(old))
+
+
+def _built_in(part: Any) -> dict[str, Any]:
+    """What a part has beside its adjustable fields."""
+    return {name: value for name, value in vars(part).items() if name not in part.adjustable}
 
 
 def _equal(new: Any, old: Any) -> bool:

@@ -211,7 +211,7 @@ class Condition(Boundary):
             raise ValueError(f"Condition: name must be a word; got {short(self.name)}")
         scales = entries(self.scale)
         if scales is None:
-            checked: Any = number("scale", self.scale, "unit of the condition", positive=True)
+            scale: Any = number("scale", self.scale, "unit of the condition", positive=True)
         else:
             scale = tuple(number(f"scale[{i}]", s, "", positive=True) for i, s in enumerate(scales))
         checked(self, scale=scale)

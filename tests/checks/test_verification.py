@@ -11,6 +11,7 @@ from dmoc import (
     Actuator,
     BallForce,
     BoxForce,
+    Check,
     Condition,
     Conservative,
     Effort,
@@ -676,3 +677,29 @@ def test_a_report_is_read_by_name(orbit):
     assert report["rollout"].name == "rollout"
     assert report["rollout"].value < report["rollout"].limit
     assert report.seconds > 0
+
+
+def farthest(evidence):
+    return Check.of("farthest", np.linalg.norm(evidence.position, axis=1).max(), 1.6, "m")
+
+
+def test_a_check_of_the_users_own_counts_as_any_other(orbit):
+    """A radius of 1.5 at the goal is within 1.6, and not within 1.4 of a scene that is moved out."""
+    report = verify(orbit, more=[farthest])
+    assert [check.name for check in report.checks] == [*CHECKS, "farthest"]
+    assert report.ok and 1.5 <= report["farthest"].value < 1.6
+    far = with_path(orbit, position=nudged(orbit.path.position, 200, 1.0))
+    assert "farthest" in failing(verify(far, more=[farthest]))
+    lost = with_path(orbit, position=nudged(orbit.path.position, 200, np.nan))
+    assert failing(verify(lost, more=[farthest])) == [*CHECKS, "farthest"]
+
+
+def test_a_check_that_is_no_number_fails_and_one_that_is_no_check_is_refused(orbit):
+    nothing = verify(orbit, more=(lambda evidence: Check.of("nothing", np.nan, 1.0, "m"),))
+    assert failing(nothing) == ["nothing"]
+    with pytest.raises(ValueError, match="'<lambda>' gives must be"):
+        verify(orbit, more=[lambda evidence: True])
+    with pytest.raises(ValueError, match="more must be functions"):
+        verify(orbit, more=farthest)
+    with pytest.raises(ValueError, match="name that is taken: farthest"):
+        verify(orbit, more=[farthest, farthest])

@@ -1,6 +1,7 @@
 """The assembled NLP has CasADi's own derivatives, a name for every place, and a graph that does not grow."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -239,6 +240,17 @@ class Ceiling(Constraint):
         return f"stays below {self.height} m"
 
 
+@dataclass(frozen=True)
+class Roof(Ceiling):
+    """A ceiling that may be raised, but whose slope is built in."""
+
+    slope: float = 0.0
+    adjustable: ClassVar[tuple[str, ...]] = ("height",)
+
+    def rows(self, t, q, u, m):
+        return [Row("height", (q[1] - self.slope * q[0]) / self.height, -np.inf, 1.0)]
+
+
 class Slanted(FreeForce):
     """A user's own, with a number that is no field."""
 
@@ -265,6 +277,10 @@ def test_what_parts_of_the_users_own_build_in_is_not_taken_for_adjustable():
     nlp.accepts(in_the_plane(constraints=Ceiling(2.0), duration=1.8))
     with pytest.raises(ValueError, match="another constraints"):
         nlp.accepts(in_the_plane(constraints=Ceiling(1.5)))
+    nlp = transcribe(in_the_plane(constraints=Roof(2.0, 0.1)), 5)
+    nlp.accepts(in_the_plane(constraints=Roof(1.5, 0.1)))
+    with pytest.raises(ValueError, match="another constraints"):
+        nlp.accepts(in_the_plane(constraints=Roof(2.0, 0.2)))
     nlp = transcribe(in_the_plane(actuator=Slanted(0.1), effects=[Weighed(2.0)]), 5)
     nlp.accepts(in_the_plane(actuator=Slanted(0.1), effects=[Weighed(2.0)], duration=1.8))
     with pytest.raises(ValueError, match="another effects, actuator"):

@@ -247,7 +247,17 @@ def test_every_constructor_is_tried():
         "Objective",
     }
     without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}
-    results = {"Formulation", "NLP", "Report", "Row", "Solution", "SolveError", "Trajectory"}
+    results = {
+        "Check",
+        "Evidence",
+        "Formulation",
+        "NLP",
+        "Report",
+        "Row",
+        "Solution",
+        "SolveError",
+        "Trajectory",
+    }
     assert made - abstract - without_arguments - results == set(MAKES)
 
 
