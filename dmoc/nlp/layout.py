@@ -68,6 +68,7 @@ class Group:
         """Such as `dynamics[17].y` or `goal.velocity.z`."""
         index, component = divmod(place - self.start, len(self.labels))
         label = self.labels[component]
+        # A user knows the ends of the path as start and goal, not by the number of a node.
         if self.name == "position" and index in (0, self.count - 1):
             return f"{'start' if index == 0 else 'goal'}.position.{label}"
         return ".".join(filter(None, [self.name + ("" if self.kind == "end" else f"[{index}]"), label]))

@@ -1,4 +1,4 @@
-"""From an accuracy to a mesh: what the error is, where it arises, and the steps that bring it down."""
+"""From an accuracy to a mesh: how large the error is, where it arises, and the steps that bring it down."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from dmoc.solver.ladder import Ladder, Rung
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
 from dmoc.solver.switches import corners, is_singular, switch_times
 
-# Refinement ends at this many nodes ...
+# Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
-# ... or after this many meshes, by which time steps at a switch have come down to the shortest.
+# Refinement ends after this many meshes: steps at a switch have then come down to the shortest.
 MOST_MESHES = 14
 # A step in which the control jumps is cut into this many parts.
 PARTS = 4
 # No step becomes shorter than this part of the duration.
 SHORTEST = 1e-5
-# More switches than this are not listed.
+# The times of switches are listed only if there are no more than this many: a message must stay short.
 MOST_SWITCHES = 12
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
@@ -56,7 +56,7 @@ def climb_to_tolerance(
 
 @dataclass(frozen=True)
 class _Found:
-    """An answer on one mesh, and how far off it is."""
+    """An answer on one mesh, and its estimated error."""
 
     rung: Rung
     error: Error
@@ -151,10 +151,12 @@ def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int,
 def _cuts_of(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
     """Into how many parts to cut each step.
 
-    Two, but for those that together make little of the local errors; at corners as many as lead to the
-    shortest step wanted there, since the error falls only with the length of that step.
+    A step is cut in two, or stays whole if it is one of those that together make little of the local errors.
+    At corners it is cut into as many parts as lead to the shortest step wanted there, since the error falls
+    only with the length of that step.
     """
     parts, order = np.full(len(errors), 2), np.argsort(errors)
+    # Cutting all steps in two leaves 2^-order of the errors: steps that together make half of that can wait.
     small = np.cumsum(errors[order]) <= 0.5 * 2.0**-path.order * errors.sum()
     parts[order[small]] = 1
     for k in corners:
@@ -173,7 +175,7 @@ def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
     """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
     times = switch_times(problem, path)
-    # several within two steps of each other are one burn that this mesh does not resolve
+    # Several switches within two steps of each other are one burn that this mesh does not resolve.
     near = (
         2
         * path.duration
