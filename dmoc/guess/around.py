@@ -138,7 +138,7 @@ def _coasts(problem: TransferProblem, duration: float, states: Any) -> Path:
 def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
     """Blend two arcs around an attractor at the origin in radius, angle and height.
 
-    The number of revolutions is the mean of what the two arcs sweep in the whole duration: it comes
+    The number of revolutions is the mean of those of the two arcs in the whole duration: it comes
     from the periods of the two ends and the duration, never from positions alone.
     """
     frame = _orbit_frame(states)

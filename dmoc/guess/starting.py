@@ -22,7 +22,7 @@ from dmoc.scene.problem import TransferProblem
 def starting_guess(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
-    """A guess on the mesh, from what is given, else from the problem's own, else from its physics.
+    """A guess on the mesh: from `given`, else from the problem's own guess, else from its physics.
 
     Raises
     ------

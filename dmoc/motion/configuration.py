@@ -33,7 +33,7 @@ class Configuration(ABC):
        unless they are overridden by shorter expressions.
     3. Where there are more coordinates than freedom: the constraint `g` and the tangent matrix `tangent`.
 
-    Not its business: what acts, what pushes, meshes and units.
+    Not its business: effects, actuators, meshes and units.
     """
 
     @property

@@ -70,7 +70,7 @@ def simulate(
     duration : float, optional
         [s], if it is not the problem's.
     compensated : bool
-        Carry what each addition of a step loses to rounding on to the next step (Kahan's sum): over a
+        Carry the rounding error of each addition of a step on to the next step (Kahan's sum): over a
         million explicit steps angular momentum is then kept to the last bit. Takes up to twice as long.
 
     Returns

@@ -1,4 +1,4 @@
-"""One run of Ipopt on one sparse NLP, and what its status means."""
+"""One run of Ipopt on one sparse NLP, and the meaning of its status."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where every unknown and every row of an NLP stands, what it is called and how it is scaled."""
+"""The places, names and scales of all unknowns and rows of an NLP."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class Objective(ABC):
 
     @property
     def label(self) -> str:
-        """What it is, such as `final mass`."""
+        """Its name for a person, such as `final mass`."""
         return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
 
     def words(self) -> str:

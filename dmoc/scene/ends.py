@@ -226,7 +226,7 @@ class Condition(Boundary):
         (t [s], q [m], v [m/s], m [kg]) -> a CasADi expression or a list of them, each zero where the
         condition holds. They must be independent of each other and of what `state` fixes.
     name : str
-        What the rows are called, such as "circular".
+        Name of the rows, such as "circular".
     scale : float or sequence of float
         Typical size of each value, in its own unit.
     state : State, optional

@@ -37,11 +37,11 @@ class TransferProblem:
     effects : sequence of Effect
         Forces and potentials that act on the body. An effect that is not listed costs no time.
     actuator : Actuator
-        What pushes it.
+        The part that pushes the body.
     objective : Objective
-        What is minimised, or maximised as `FinalMass` is.
+        The quantity that is minimised, or maximised as `FinalMass` is.
     constraints : sequence of Constraint
-        What is forbidden on the way.
+        Limits that the path keeps all along the way.
     guess : callable, tuple of arrays or Solution, optional
         Starting guess of the path: a function of the time [s] that gives the position [m], a pair
         (times, positions) of shapes (count,) and (count, dimension), or a former solution.

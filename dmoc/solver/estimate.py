@@ -42,8 +42,8 @@ def estimate(
 ) -> Error:
     """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
 
-    Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
-    f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
+    Where the error falls by a factor f from mesh to mesh, the error that is left is the last change over
+    f - 1: f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
     """
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
@@ -55,7 +55,9 @@ def estimate(
 
 
 def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
-    """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
+    """The part of the objective that the rounding of |F| at zero adds, to first order.
+
+    It is the width of the rounding times the derivative of the objective by it.
 
     The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
     e / sqrt(|F|^2 + e^2) by e, and its multipliers are the derivatives of the objective.

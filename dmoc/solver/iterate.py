@@ -28,7 +28,7 @@ def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess:
     Raises
     ------
     ValueError
-        With the effect, the node and what it looked at there.
+        With the effect, the node and the arguments that the effect had there.
     """
     with np.errstate(all="ignore"):
         state = _states(problem, guess)

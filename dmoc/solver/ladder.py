@@ -32,7 +32,7 @@ MOST_EXPLAINED = 2000
 # A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
 LEAST_HALVED = 9
 # Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
-# from too short a duration Ipopt often finds no path, from too long a one it does.
+# the first one may have been too short.
 LONGER = 10
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")

@@ -101,7 +101,7 @@ def trial_path(
 def guess_on(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
-    """A starting guess; for very many steps it is made on fewer, if they follow its revolutions, and carried."""
+    """A starting guess; for very many steps it is made on fewer that follow its revolutions, and carried."""
     fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
     if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
         found = starting_guess(problem, fewer, order, hold)

@@ -28,8 +28,8 @@ MOST_DURATIONS = 9
 # Each duration that is tried is at most this much longer or shorter than the one before, in the natural
 # logarithm.
 WIDEST = 1.0
-# The search for a duration aims at one that needs this much less than the limits [-], and ends at most there
-# twice.
+# The search for a duration aims at one that needs this much less than the limits [-], and ends where it is
+# between 0 and twice this.
 EXACT = 1e-3
 
 

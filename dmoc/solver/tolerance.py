@@ -113,7 +113,8 @@ class _Refinement:
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
 
-        What the rounding of |F| costs counts in the error, but no mesh brings it down: it does not decide.
+        The cost of the rounding of |F| counts in the error, but not in whether the tolerance is met: no mesh
+        brings it down.
         """
         found = estimate(self.problem, self.ladder.dynamics, path, self.changes, most)
         met = found.largest <= self.tol
