@@ -1,1 +1,1 @@
-"""What knows nothing of transfers: checks of arguments, files, numerics, machine code."""
+"""Tools that know nothing of transfers: checks of arguments, files, numerics, machine code."""

@@ -20,8 +20,9 @@ MOST_COUNTED = 10_000_000
 # Longer values are cut off in a message, which should fit on one line of a terminal [letters].
 SHORT = 60
 
-# What a part takes for a vector; it holds the tuple that `vector` makes of it. None stands for what is free.
+# A part takes one of these types for a vector; it holds the tuple that `vector` makes of it.
 Vector = Sequence[float] | np.ndarray
+# A boundary also takes None, for an entry that is free or for a vector whose entries are all free.
 FreeVector = Sequence[float | None] | np.ndarray | None
 
 
@@ -31,7 +32,7 @@ def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative
         result = math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
         several = np.ndim(value) > 0 if isinstance(value, np.ndarray) else False
     except Exception:
-        # the conversion of a user's own object may raise anything
+        # The conversion of a user's own object may raise anything.
         several = True
     if several:
         raise ValueError(f"{name} must be one number{_in(unit)}; got {short(value)}") from None
@@ -131,7 +132,7 @@ def short(value: Any) -> str:
 
 
 def times_each(value: float | Vector, factor: float) -> float | tuple[float, ...]:
-    """A number, or each of several, so many times as large."""
+    """A number, or each of several, times `factor`."""
     return factor * value if isinstance(value, (int, float)) else tuple(factor * float(each) for each in value)
 
 

@@ -21,10 +21,15 @@ from pathlib import Path
 
 import casadi as ca
 
+# The first of these C compilers that the computer has is used.
 COMPILERS = ("cc", "gcc", "clang")
+# The compiler gets these flags; with other flags a library gets another name.
 FLAGS = ("-O1", "-fPIC", "-shared")
-# Functions of fewer instructions gain nothing; the oldest libraries beyond this number are removed.
-WORTHWHILE, MOST_KEPT = 100, 200
+# A function is compiled if it has at least this many instructions: shorter ones gain nothing.
+WORTHWHILE = 100
+# The folder keeps this many libraries; the oldest ones beyond are removed.
+MOST_KEPT = 200
+# The compiler is given up after this time [s]; functions then stay as they are.
 PATIENCE_S = 120
 
 
@@ -47,7 +52,7 @@ def compiler() -> str | None:
 
 def folder() -> str | None:
     """The user's folder for libraries; None where it cannot be made or others may write to it."""
-    # by its specification a path that is not absolute does not count
+    # By the specification of XDG_CACHE_HOME a path that is not absolute does not count.
     given = os.environ.get("XDG_CACHE_HOME", "")
     place = os.path.join(given if os.path.isabs(given) else os.path.expanduser("~/.cache"), "dmoc")
     try:
@@ -107,7 +112,7 @@ def _compile(source: str, library: Path) -> bool:
             code.write_text(source)
             command = [program, *FLAGS, str(code), "-lm", "-o", str(made)]
             subprocess.run(command, check=True, capture_output=True, timeout=PATIENCE_S)
-            # where a umask lets the group write, the library would not be loaded
+            # A umask may let the group write, and such a library would not be loaded.
             made.chmod(0o600)
             record.write_text(hashlib.sha256(made.read_bytes()).hexdigest())
             made.replace(library)

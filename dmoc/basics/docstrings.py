@@ -1,4 +1,4 @@
-"""What a numpydoc docstring says of its parameters: read, never copied."""
+"""Units and descriptions of parameters, read from numpydoc docstrings, so that they are written only once."""
 
 from __future__ import annotations
 

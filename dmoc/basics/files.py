@@ -51,7 +51,7 @@ def whole_file(path: str | os.PathLike) -> Iterator[Path]:
     try:
         yield temporary
         with open(temporary, "rb+") as written:
-            # after a power cut there must be no file of that name without its contents
+            # After a power cut there must be no file of that name without its contents.
             os.fsync(written.fileno())
         os.replace(temporary, target)
     except OSError as error:
@@ -79,8 +79,8 @@ def is_sealed(path: Path) -> bool:
     whole = path.read_bytes()
     length = len(_seal_of(b""))
     found, wanted = whole[-length:], _seal_of(whole[:-length])
-    # a file that never had a checksum may be read. One whose seal is damaged too must not pass for such a file:
-    # where most bytes before the checksum are those of the seal, it had one
+    # A file that never had a checksum may be read. A file whose seal is damaged must not pass for such a one:
+    # if most bytes at the place of the seal are right, the file had a checksum.
     if found != wanted and sum(a == b for a, b in zip(found, SEAL, strict=False)) > len(SEAL) / 2:
         raise ValueError(f"{path} is damaged: its checksum does not hold; {AGAIN}")
     return found == wanted

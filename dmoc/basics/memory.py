@@ -1,4 +1,4 @@
-"""What was written down for one scene, remembered for the next solve of the same one in this process.
+"""Functions that were written down for one scene, remembered for the next solve of it in this process.
 
 Remembered are small CasADi functions of one point, step or node, never anything that grows with the mesh.
 A scene is known again by its parts and their numbers. One that holds an object that is not dmoc's own,
@@ -19,16 +19,17 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-# This many functions are remembered; the ones used longest ago go first.
+# At most this many functions are remembered; the ones used longest ago go first.
 MOST = 500
 # A table of more rows is long: a key holds its digest, not all of it.
 MOST_ROWS = 100
 
+# The type of a thing that is made once and then taken from a shelf.
 T = TypeVar("T")
 
 
 class Shelf:
-    """At most so many things by their keys; the ones used longest ago make room for new ones."""
+    """At most `most` things by their keys; the ones used longest ago make room for new ones."""
 
     _all: ClassVar[list[Shelf]] = []
 
@@ -38,7 +39,7 @@ class Shelf:
         self._all.append(self)
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What stands there, or else what `make` gives, which then stands there."""
+        """The thing with this key; if there is none, `make` makes it, and it is put there."""
         # An entry that is taken out and put in again stands last, also where another thread did the same.
         found = self._held.pop(key, None)
         self._held[key] = found = make() if found is None else found
@@ -53,11 +54,12 @@ class Shelf:
             shelf._held.clear()
 
 
+# The functions that this process remembers, by the identity of the scene that they were written for.
 _functions = Shelf(MOST)
 
 
 def remembered(make: Callable[[], T], *key: Any) -> T:
-    """What `make` gives, or gave before for the same key."""
+    """The result of `make`, or its earlier result for the same key."""
     try:
         name = identity(key)
     except TypeError:
@@ -74,13 +76,13 @@ class remembered_property(cached_property):  # noqa: N801 - used as a decorator
 
 
 def forget() -> None:
-    """Start as a new process does, for one that measures."""
+    """Forget all functions, so that a measurement starts as a new process does."""
     Shelf.clear_all()
 
 
 def identity(value: Any) -> Hashable:
     """Equal for values that are the same for every purpose; raises TypeError where that cannot be told."""
-    # of exactly these types: what derives from them may do anything
+    # Types must match exactly: a class that derives from one of them may do anything.
     kind = type(value)
     if kind in (type(None), bool, int, str):
         return kind, value
@@ -102,7 +104,7 @@ def identity(value: Any) -> Hashable:
 
 
 def _digest(rows: Any) -> str:
-    """Of a long table; one of floats alone is not looked at number by number, which would take long."""
+    """The digest of a long table; a table of floats alone is taken as a whole, as entry by entry takes long."""
     nested = set(map(type, rows)) == {tuple}
     numbers = list(chain.from_iterable(rows)) if nested else rows
     if set(map(type, numbers)) == {float} and (not nested or len(set(map(len, rows))) == 1):
@@ -125,5 +127,5 @@ def _is_patched(kind: type) -> bool:
         for part in vars(base).values()
         if type(part) is FunctionType and part.__module__ != base.__module__
     ]
-    # those that dataclasses make are not dmoc's either
+    # Methods that dataclasses generate do not belong to dmoc either, but nobody patched them in.
     return any(not _is_own(part) and part.__module__ not in sys.stdlib_module_names for part in methods)

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-# A coupling of two unknowns below this share of them changes no digit.
+# Two unknowns whose coupling is below this [-], the unknowns being near 1, are solved separately: no digit
+# changes.
 UNCOUPLED = 1e-17
 
 
@@ -28,7 +29,7 @@ def cubic_spline(x: np.ndarray, y: np.ndarray, slopes: tuple | None = None) -> C
     ----------
     C. de Boor, A Practical Guide to Splines (2001), chapter IV.
     """
-    # points along the last axis: NumPy is slow over a short one
+    # The points lie along the last axis: NumPy is slow over a short one.
     values = np.ascontiguousarray(y.T)
     h = np.diff(x)
     rises = np.diff(values) / h
@@ -48,7 +49,7 @@ def cubic_spline(x: np.ndarray, y: np.ndarray, slopes: tuple | None = None) -> C
             below[-1], middle[..., -1] = left[-1], 2 * middle[..., -1] - end
             inner = _tridiagonal(below, above, middle)
         else:
-            # three points lie on one parabola
+            # Through three points there is one parabola.
             inner = middle / 1.5
         first, last = (begin - inner[..., 0]) / left[0], (end - inner[..., -1]) / right[-1]
     slope = np.concatenate([first[..., None], inner, last[..., None]], axis=-1)
@@ -105,7 +106,7 @@ def adams(motion: dict[str, ca.SX], places: np.ndarray, tol: float, most_steps: 
         "linear_multistep_method": "adams",
         "nonlinear_solver_iteration": "functional",
         "max_num_steps": most_steps,
-        # not from the first place: the same steps whatever places are asked for
+        # A fixed first step: else it would follow from the first place, and all steps with it.
         "step0": 1e-7,
         "disable_internal_warnings": True,
         "show_eval_warnings": False,
@@ -116,7 +117,7 @@ def adams(motion: dict[str, ca.SX], places: np.ndarray, tol: float, most_steps: 
 def root(function: Callable[[float], float], a: float, b: float, tol: float) -> float:
     """Where a function changes its sign between a and b: false position by the Illinois rule.
 
-    M. Dowell, P. Jarratt, BIT 11 (1971): an end that stays counts half, so that both come closer.
+    M. Dowell, P. Jarratt, BIT 11 (1971): the value at an end that stays is halved, so that this end moves, too.
     """
     at_a, at_b = function(a), function(b)
     while at_b and abs(b - a) > tol:

@@ -1,1 +1,1 @@
-"""Not on Ipopt's word: residual, rollout, reference, ledger, bounds, optimality, stability."""
+"""Checks without Ipopt's word: residual, rollout, reference, ledger, bounds, optimality, stability."""

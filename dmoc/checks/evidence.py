@@ -1,4 +1,4 @@
-"""A solution together with what its checks need of it, each found once."""
+"""A solution together with the numbers that its checks need, each computed once."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from dmoc.motion.momenta import end_momenta, legendre_momenta, step_matrices
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
+# The rounding error of a number counts as ten times the smallest relative one [-]: several additions lie
+# between the numbers of a solution and those that a check compares.
 ROUNDING = 10 * np.finfo(float).eps
 
 
@@ -37,7 +39,7 @@ class Evidence:
         self.momentum, self.velocity = end_momenta(self.dynamics, self.path, self.begin, self.momenta)
 
     def undefined(self) -> str:
-        """What of the path is not a finite number, in words; empty if all is."""
+        """The names of the arrays that hold a number that is not finite; empty if there is none."""
         parts: dict[str, Any] = {
             "mesh": self.path.mesh,
             "duration": self.path.duration,
@@ -84,7 +86,7 @@ class Evidence:
 
     @property
     def pulls(self) -> np.ndarray:
-        """What acts at every node, potentials and other effects, shape (nodes, 2 axes) [m/s^2]."""
+        """Accelerations by potentials and by other effects at every node, shape (nodes, 2 axes) [m/s^2]."""
         return np.concatenate(self.point, axis=1)
 
     def boundary_momentum(self, place: int) -> np.ndarray:
@@ -98,7 +100,7 @@ class Evidence:
         """Derivative of the one-step map along the path, shape (steps, 2 axes, 2 axes) [SI]."""
         return step_matrices(self.dynamics, self.path, self.begin)
 
-    # scales
+    # The checks judge those numbers by the scales that follow.
 
     @cached_property
     def largest(self) -> float:
@@ -112,7 +114,7 @@ class Evidence:
 
     @cached_property
     def extent(self) -> float:
-        """Diagonal of the box around the path [m]; of a body that stays, a billionth of where it could be."""
+        """Diagonal of the box around the path [m]; at least a billionth of what it could cover."""
         return max(self.path.diagonal, 1e-9 * self.acceleration * self.path.duration**2) or 1.0
 
     @cached_property
@@ -127,7 +129,7 @@ class Evidence:
 
     @cached_property
     def rounding(self) -> float:
-        """Ten times the rounding error of a position [m]: far from the origin it is what limits every check."""
+        """Ten times the rounding error of a position [m]: far from the origin no check can be stricter."""
         return ROUNDING * float(np.abs(self.position).max())
 
     @cached_property

@@ -1,4 +1,4 @@
-"""By how much a path breaks what it must keep: force, duration, mass, boundary, zones and speed."""
+"""By how much a path breaks its limits: force, duration, mass, boundary, zones and speed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,18 @@ import numpy as np
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.dynamics import state_symbols
 
-# What the optimiser may leave of a limit, what round-off may leave of an entry that is simply fixed,
-# and how deep a path may cut into a zone between nodes however coarse its mesh.
-BOUND, FIXED, DEEPEST = 1e-6, 1e-9, 1e-2
-# Into how many parts a gap between two nodes is divided, at least, and how many that may be in all.
-FEWEST, MOST_PLACES = 8, 1_000_000
+# A limit may be exceeded by this part of its scale [-]: the optimiser meets rows to a tolerance, not exactly.
+BOUND = 1e-6
+# A boundary entry that is fixed may be off by this part of the extent or speed [-]: it is a bound, not a row,
+# so only round-off moves it.
+FIXED = 1e-9
+# Between nodes a path may cut into a zone by at most this part of the zone's size [-], however coarse its mesh.
+DEEPEST = 1e-2
+# A gap between two nodes is looked at in at least this many places.
+FEWEST = 8
+# All gaps together are looked at in no more places than this, unless the fewest of each gap are more: that
+# bounds the memory.
+MOST_PLACES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,7 @@ class Excess:
 
     @property
     def share(self) -> float:
-        """The excess over what is allowed; infinite where it is not a number."""
+        """The excess over the excess that is allowed [-]; infinite where it is not a number."""
         return float(np.nan_to_num(self.value / self.allowed, nan=np.inf))
 
 
@@ -99,11 +106,11 @@ def _row_excess(
 def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     """Zones at the nodes and between them; a speed limit everywhere.
 
-    Rows act at nodes alone, so between two of them a path may cut into a zone: by what the chord
-    does, d^2 / 8r for nodes a distance d apart at a sphere of radius r, and by how far the path bends
-    away from its chord. A speed limit acts on mean velocities inside the steps, from which those at
-    the nodes differ by half of what they are off the line between their neighbours. All of this is of
-    order h^2, and none of it excuses more than a hundredth.
+    Rows act at nodes alone, so between two of them a path may cut into a zone. The allowance is the depth of
+    the chord, d^2 / 8r for nodes a distance d apart at a sphere of radius r, plus the distance of the path
+    from its chord. A speed limit acts on mean velocities inside the steps. A velocity at a node may differ
+    from them by half of its distance from the line between its neighbours. These allowances are of order
+    h^2, and none exceeds a hundredth of the size or the speed.
     """
     if not evidence.problem.constraints:
         return
@@ -121,6 +128,7 @@ def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
         at_nodes = _most(constraint.excess(evidence.position, evidence.node_velocity))
         yield Excess(f"{name} at nodes", at_nodes, BOUND * evidence.extent, constraint.unit)
         size = constraint.feature()
+        # A zone that tells no size is judged by how deep the chords themselves cut into it.
         cut = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
         cut = min(cut + bend, DEEPEST * min(size, evidence.extent))
         between = _most(constraint.excess(path, still))
@@ -138,6 +146,7 @@ def _inside_gaps(evidence: Evidence, longest: float) -> tuple[np.ndarray, ...]:
     smallest = min(constraint.feature() for constraint in evidence.problem.constraints)
     parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
+    # The cubic is the chord plus a bend that vanishes at both nodes, from the end velocities less the mean one.
     mean = np.diff(q, axis=0)[:, None] / tau
     first, second = v[:-1, None] - mean, v[1:, None] - mean
     chord = q[:-1, None] + u * tau * mean

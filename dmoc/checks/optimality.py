@@ -1,4 +1,4 @@
-"""Whether a path is a stationary point of its own discrete problem, multipliers and all."""
+"""Whether a path and its multipliers are a stationary point of its own discrete problem."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dmoc.nlp.units import units_of
 
 @dataclass(frozen=True)
 class Stationarity:
-    """What is left of the first-order conditions, each relative to the objective or the force [-].
+    """The errors of the first-order conditions, each relative to the objective or the force [-].
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Stationarity:
     limits : float
         Multipliers of limits that do not act, or of the wrong sign, times the distance from the limit.
     objective : float
-        What the path costs against what the solution says it costs.
+        The difference between the cost of the path and the objective that the solution reports.
     """
 
     force: float
@@ -56,6 +56,7 @@ def stationarity(evidence: Evidence) -> Stationarity:
     slope = slope + lam_x
     weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
     weights["control"] = weights["step" if nlp.hold else "node"]
+    # Errors of the costate add up along the path, so sums from the start on are judged, not single entries.
     along = [group.of(slope) for group in nlp.columns.groups if group.kind != "control"]
     force = nlp.columns["force"]
     idle = [
@@ -77,8 +78,8 @@ def stationarity(evidence: Evidence) -> Stationarity:
 def _unassembled(evidence: Evidence) -> tuple[NLP, list]:
     """The NLP of a path without its sparse derivatives, and its blocks.
 
-    Its units are those of a body that is pushed at least as hard as it takes to cross the path in the
-    duration: where hardly any force is needed there is nothing to be measured relative to it.
+    Its unit of force is at least the force that moves the body over the extent of the path in the duration:
+    a solution that needs hardly any force would have no scale for errors of its force.
     """
     problem, path = evidence.problem, evidence.path
     if evidence.largest < evidence.typical_force:
@@ -120,11 +121,11 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
 def _idle(layout: Any, multipliers, values, lower, upper, weights: dict) -> float:
     """Largest multiplier times the distance from its limit, as a density in time.
 
-    Steps shorter than the mean count as the mean: what the barrier leaves at each limit is one
-    number for all, and over the shortest steps of a graded mesh it would look like a price.
+    Steps shorter than the mean count as the mean. The barrier leaves the same product at every limit, which
+    divided by the shortest steps of a graded mesh would look like a limit that acts.
     """
     room = np.where(multipliers > 0, upper - values, values - lower)
-    # a limit that is not there, or that is far away, must not have a multiplier at all
+    # A limit that is not there, or that is more than one unit away, must not have a multiplier at all.
     product = np.abs(multipliers) * np.clip(room, 0.0, 1.0)
     product[lower == upper] = 0.0
     worst = [

@@ -21,11 +21,20 @@ from dmoc.motion.stability import growth_along
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
-# What each check allows; the reasons stand where they are used.
+# A row of motion, as a force, may be off by this part of the largest force of the actuator or the scene [-]:
+# Ipopt meets rows to a tolerance.
 RESIDUAL = 1e-6
-ROLLOUT, ROLLOUT_MOST = 1e-8, 1e-3
+# The scheme marched forward may miss the path by this part of its extent and speed [-], times the factor by
+# which the path amplifies errors: the optimiser's errors grow on the way, too.
+ROLLOUT = 1e-8
+# The scheme marched forward may never miss the path by more than this part of it [-], however unstable it is.
+ROLLOUT_MOST = 1e-3
+# The independent integrator may miss the goal by this part of the path [-] if no tolerance was asked for: a
+# mesh that is too coarse for its motion misses by more.
 REFERENCE = 1e-2
+# Momentum, mass and the reported arrays may be off by this part of themselves [-]: they are exact sums.
 LEDGER = 1e-8
+# The first-order conditions may be off by this part of the objective or the force [-].
 OPTIMALITY = 1e-5
 
 
@@ -67,7 +76,7 @@ def verify(
     problem: TransferProblem | None = None,
     more: Sequence[Callable[[Evidence], Check]] = (),
 ) -> Report:
-    """Check a solution: nothing here uses what the optimiser said of it.
+    """Check a solution, without a look at the optimiser's own verdict on it.
 
     Parameters
     ----------
@@ -88,7 +97,7 @@ def verify(
         reported are those of the path; bounds : the worst excess over a limit and the worst miss of a
         boundary condition, at the nodes and between them; optimality : the first-order conditions
         with the solution's multipliers (for least effort lambda = -m F where no limit of the force
-        acts), and whether the objective is what the path costs; stability : growth of the one-step
+        acts), and whether the objective is the cost of the path; stability : growth of the one-step
         matrix over that of the exact flow. A number that is not finite fails.
 
     Raises
@@ -128,7 +137,7 @@ def _own(more: Any) -> list[tuple[str, Callable[[Evidence], Check]]]:
 def _residual(evidence: Evidence) -> Check:
     """Row k of the discrete Euler-Lagrange equations is a momentum; over the node's weight, a force.
 
-    In units of length the same row would be h^2 / m times smaller and hide what it is to show.
+    In units of length the same row would be h^2 / m times smaller and hide its error.
     """
     rows = np.zeros_like(evidence.position)
     np.add.at(rows, evidence.at, evidence.momenta)
@@ -143,14 +152,14 @@ def _residual(evidence: Evidence) -> Check:
         ]
     )
     scale = np.max([evidence.problem.actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
-    # positions are known to a rounding error of their size: no row can be better than that over h^2
+    # Positions are known to a rounding error of their size: no row can be better than that over h^2.
     floor = evidence.mass.max() * evidence.rounding / evidence.shortest**2
     note = f"at dynamics[{node}].{'xyz'[axis]}"
     return Check.of("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
 
 
 def _rollout(evidence: Evidence) -> Check:
-    """March the scheme from the start; what the transfer itself amplifies is not held against the path."""
+    """March the scheme from the start; errors that the motion itself amplifies are allowed for in the limit."""
     begin, n = evidence.boundary_momentum(0), evidence.problem.dimension
     q, p = rollout(evidence.dynamics, evidence.path, evidence.begin, evidence.position[0], begin)
     miss, slip = np.abs(q - evidence.position[evidence.ends]).max(), np.abs(p - evidence.momentum).max()
@@ -170,6 +179,7 @@ def _rollout(evidence: Evidence) -> Check:
 def _amplification(matrices: np.ndarray) -> float:
     """How much a small error can grow, at most, from the start to any step or from any step to the goal."""
     since_start = np.empty_like(matrices)
+    # The map from the k-th step to the goal is the whole product times the inverse of the map up to that step.
     product = np.eye(matrices.shape[1])
     for k, matrix in enumerate(matrices):
         product = since_start[k] = matrix @ product
@@ -196,7 +206,7 @@ def _reference(evidence: Evidence) -> Check:
 
 
 def _accuracy(evidence: Evidence) -> float:
-    """What the error of the discretisation may be: ten times the tolerance if there is one."""
+    """Limit for the error of the discretisation [-]: ten times the tolerance if there is one."""
     return REFERENCE if evidence.solution.tolerance is None else 10 * evidence.solution.tolerance
 
 
@@ -238,6 +248,7 @@ def _energy_gap(evidence: Evidence) -> float | None:
             * evidence.weights
         )
     else:
+        # The work of a held force is that force times the way of its step.
         moves, middle = (
             np.diff(evidence.position[evidence.ends], axis=0),
             evidence.mass[evidence.at].mean(axis=0),
@@ -248,7 +259,7 @@ def _energy_gap(evidence: Evidence) -> float | None:
 
 
 def _bounds(evidence: Evidence) -> Check:
-    """The limit that is broken most against what it is allowed."""
+    """The limit whose excess is the largest part of the excess that is allowed."""
     worst = max(excesses(evidence), key=lambda limit: limit.share)
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
     shortest, longest = evidence.problem.duration_bounds
@@ -278,6 +289,7 @@ def _stability(evidence: Evidence) -> Check:
     return Check.of("stability", growth.value, growth.limit, "growth a step", note)
 
 
+# The checks by name, in the order in which a report lists them.
 CHECKS: dict[str, Callable[[Evidence], Check]] = {
     "residual": _residual,
     "rollout": _rollout,

@@ -1,1 +1,1 @@
-"""Where to start: a path from physics."""
+"""Starting guesses: a path to start from, made from the physics of a scene."""

@@ -16,24 +16,30 @@ from dmoc.guess.open_ends import spiral_between, velocity_change_between, windin
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 
-# Coasts are followed at this many places at most, paths compared at this many a revolution.
-MOST_SAMPLES, PLACES_A_TURN = 100_000, 100
-# More revolutions would need more memory than there is; as a rule a unit is wrong.
+# A coast is followed at this many places at most; at 20 places a revolution they are enough for 5,000.
+MOST_SAMPLES = 100_000
+# Paths are compared at this many places a revolution, where they are differentiated twice.
+PLACES_A_TURN = 100
+# A guess has at most this many revolutions: more would need more memory than there is, and as a rule a unit is
+# wrong.
 MOST_TURNS = 10_000
+# A duration is long enough if a guess needs less than this many times the limit of the force in it: a guess is
+# not the best path, which needs less.
+GENEROUS = 4.0
+# This many durations between the shortest and the longest are tried, each longer by the same factor.
+DURATIONS = 16
 
+# A path is a function of fractions of the duration, shape (count,), that gives positions [m], (count, axes).
 Path = Callable[[np.ndarray], np.ndarray]
-
-
-# A guess is not the best path: the shortest duration is near where it needs so much more than the limit.
-GENEROUS, DURATIONS = 4.0, 16
 
 
 def shortest_flyable(problem: TransferProblem, states: Callable[[float], Any], acceleration: float) -> float:
     """About the least duration in which a force limit takes a body between two states near an attractor [s].
 
-    Of some durations within the bounds the first in which the default path needs no more than four times
-    the limit, in the mean square, or from three revolutions on as long as a spiral takes; `states` gives
-    the states of both ends for a duration.
+    Durations within the bounds are tried from the shortest on. The first one is taken in which the default
+    path needs less than four times the limit, in the mean square. Once there are three revolutions, it is
+    instead the time in which the limit gives the velocity change of a spiral, and a fifth more. `states`
+    gives the states of both ends for a duration.
     """
     longest, sample = problem.duration_bounds[1], np.linspace(0.0, 1.0, PLACES_A_TURN * (2 + MANY_TURNS))
     for duration in np.geomspace(*problem.duration_bounds, DURATIONS):
@@ -48,17 +54,18 @@ def shortest_flyable(problem: TransferProblem, states: Callable[[float], Any], a
 
 
 def _turn_rate(problem: TransferProblem, states: Any) -> float:
-    """Revolutions a second on a circle through the outer one of two places."""
+    """Revolutions a second on a circle through that of the two places where they are slower [1/s]."""
     rates = problem.attraction.rates(np.stack([position for position, _ in states]))
     return float(rates.min() / (2 * np.pi))
 
 
 def path_around(problem: TransferProblem, duration: float, states: Any, fractions: np.ndarray) -> tuple:
-    """Positions at fractions of the duration, and whether it is worth to begin with the forces along them.
+    """Positions at fractions of the duration, and whether the forces along them are worth starting from.
 
-    Where the place at one end is open it is a spiral that ends there. Else it is what needs the least
-    force: coasts from both ends, blended, or an orbit that changes evenly, with the number of
-    revolutions that fits the duration best or, where none fits well, one more or less.
+    If one end leaves its place open, the path is a spiral that ends there. Else it is the candidate that
+    needs the least force: coasts from both ends, blended, or an orbit that changes evenly. That orbit has
+    the number of revolutions that fits the duration best; where none fits well, one revolution more and
+    one less are candidates too.
 
     Raises
     ------
@@ -76,9 +83,9 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     windings = windings_between(problem, duration, states)
     many = bool(windings) and windings[0][1] >= MANY_TURNS
     if problem.free_duration and not many:
-        # the duration will follow from the phase, not the other way round
+        # A free duration will follow from the phase, so no revolutions have to fit the one assumed here.
         windings = []
-    # a path, and whether it is worth its forces
+    # Each candidate is a path, and whether the forces along it are worth starting from.
     paths: list[tuple[Path, bool]] = [(winding, True) for winding, _, _ in windings]
     if not (many or (windings and windings[0][2])):
         paths.append((_coasts(problem, duration, states), False))
@@ -92,7 +99,7 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
 
 
 def _needed(problem: TransferProblem, path: np.ndarray, times: np.ndarray, states: Any) -> float:
-    """Mean square of the acceleration that a path takes beside what acts [m^2/s^4]."""
+    """Mean square of the acceleration that a path needs in addition to that of the effects [m^2/s^4]."""
     velocity = np.gradient(path, times, axis=0)
     velocity[0], velocity[-1] = (v for _, v in states)
     given = problem.start_time + times[None], path.T, velocity.T, problem.mass, np.zeros(problem.dimension)
@@ -131,12 +138,13 @@ def _coasts(problem: TransferProblem, duration: float, states: Any) -> Path:
 def _blend_around(sample: np.ndarray, first: np.ndarray, second: np.ndarray, states) -> np.ndarray:
     """Blend two arcs around an attractor at the origin in radius, angle and height.
 
-    The number of revolutions is the mean of what the two arcs sweep in the whole duration: it comes
+    The number of revolutions is the mean of those of the two arcs in the whole duration: it comes
     from the periods of the two ends and the duration, never from positions alone.
     """
     frame = _orbit_frame(states)
     arcs = [np.pad(arc, ((0, 0), (0, 3 - arc.shape[1]))) @ frame for arc in (first, second)]
     angles = [np.unwrap(np.arctan2(arc[:, 1], arc[:, 0])) for arc in arcs]
+    # The second arc is turned by whole revolutions until the way between the ends is nearest to the mean sweep.
     sweeps = [angle[-1] - angle[0] for angle in angles]
     gap = angles[1][-1] - angles[0][0] - 0.5 * (sweeps[0] + sweeps[1])
     angles[1] = angles[1] - 2 * np.pi * np.round(gap / (2 * np.pi))
@@ -157,6 +165,7 @@ def _orbit_frame(states) -> np.ndarray:
     for q, v in states:
         momentum = np.cross(np.pad(q, (0, 3 - len(q))), np.pad(v, (0, 3 - len(v))))
         normal += momentum / (np.linalg.norm(momentum) or 1.0)
+    # Two opposite senses of rotation cancel: then there is no mean plane, and the xy plane stands in.
     if len(states[0][0]) == 2 or np.linalg.norm(normal) < 1e-6:
         normal = np.array([0.0, 0.0, 1.0])
     normal /= np.linalg.norm(normal)
@@ -174,6 +183,7 @@ def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) ->
         offset = path - center
         distance = np.linalg.norm(offset, axis=1, keepdims=True)
         least = 0.2 * min(np.linalg.norm(q0 - center), np.linalg.norm(q1 - center))
+        # A node in the centre itself has no direction away from it and is pushed to the side of the way.
         sideways = np.roll(q1 - q0, 1) if len(q0) > 1 else np.ones(1)
         offset = np.where(distance > 1e-9 * least, offset, sideways / (np.linalg.norm(sideways) or 1.0))
         length = np.linalg.norm(offset, axis=1, keepdims=True)
@@ -182,4 +192,5 @@ def _keep_clear(path: np.ndarray, attractors, q0: np.ndarray, q1: np.ndarray) ->
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
+    """From 0 at 0 to 1 at 1, level at both."""
     return x * x * (3 - 2 * x)

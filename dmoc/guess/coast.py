@@ -1,4 +1,4 @@
-"""Where a body gets without thrust, and from that the states of ends that leave them open."""
+"""Coasts: where a body gets without thrust."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from dmoc.effects.base import Conservative
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 
-# A coast is followed at this many places at least.
+# A coast is followed at this many places at least; between them it is interpolated linearly.
 LEAST_SAMPLES = 2000
-# From so many revolutions on a path between two states winds evenly around the attractor.
+# From this many revolutions on a guess between two states is an orbit that changes evenly: two coasts that are
+# blended would be off by revolutions. The solver treats such a transfer as one of many revolutions, too.
 MANY_TURNS = 3
 
 
@@ -28,7 +29,7 @@ def coast(
     Times are counted from the start [s]; `finish` may lie before `begin`. Shape (samples, 2 axes);
     None where the body falls into an attractor.
     """
-    # without what resists: backward in time drag feeds the motion without bound
+    # Only conservative effects act: backward in time a drag would feed the motion without bound.
     conservative = tuple(effect for effect in problem.effects if isinstance(effect, Conservative))
     dynamics = Dynamics.of(problem, conservative)
     centers = tuple(tuple(attractor.place(problem.dimension)) for attractor in problem.attraction.sources)
@@ -41,7 +42,7 @@ def coast(
         states = march(x0=np.concatenate(state) / scales, p=given)["xf"].full().T * scales
     except RuntimeError:
         return None
-    # what has fallen in stays there
+    # A body that has fallen in stays where it is, so the last state tells.
     last = states[-1, : problem.dimension]
     fell_in = any(math.dist(last, center) <= near for center, near in zip(centers, least, strict=True))
     return None if fell_in or not np.isfinite(states).all() else states
@@ -50,8 +51,8 @@ def coast(
 def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
     """Scaled state, (time, span, mass, scales, nearest distances) -> states of a coast.
 
-    A body that comes nearer to an attractor than that stays where it is: nothing is ever evaluated at
-    a singularity, and no step becomes endlessly small.
+    A body that comes nearer to an attractor than its nearest distance stays where it is: nothing is ever
+    evaluated at a singularity, and no step becomes endlessly small.
     """
     n, fraction = dynamics.positions, ca.SX.sym("fraction")
     state, given = ca.SX.sym("state", 2 * n), ca.SX.sym("given", 5 + len(centers))
@@ -61,6 +62,7 @@ def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
     rate = span * ca.vertcat(v / length, pull / speed)
     for center, near in zip(centers, least, strict=True):
         rate = ca.if_else(ca.sumsqr(q - ca.DM(center)) <= near**2, 0, rate)
-    # more steps from one of so many places to the next are for more revolutions than a guess can have
+    # A coast that takes more than 1000 steps between two neighbouring places has more revolutions than a guess
+    # can have.
     motion = {"t": fraction, "x": state, "p": given, "ode": rate}
     return adams(motion, np.linspace(0.0, 1.0, samples), tol=1e-10, most_steps=1000)

@@ -14,18 +14,23 @@ from dmoc.guess.winding import Winding
 from dmoc.scene.ends import Boundary
 from dmoc.scene.problem import TransferProblem
 
-# How often the place where a spiral arrives is put onto the open orbit, from which the next spiral starts.
+# A spiral to an open orbit is made this many times: the place where it arrives is put onto that orbit and is
+# the aim of the next one.
 PASSES = 3
-
-
-# Orbits beyond this eccentricity, or this cosine of the angle between their planes, have no even change.
-MOST_ECCENTRIC, NEARLY_ROUND, OPPOSITE = 0.9, 0.3, -0.9
+# An orbit above this eccentricity [-] is not changed evenly into another: its body is fast and slow by turns.
+MOST_ECCENTRIC = 0.9
+# An orbit below this eccentricity [-] that changes evenly is sure to be near the best path, so that blended
+# coasts need not be compared with it.
+NEARLY_ROUND = 0.3
+# An orbit is not changed evenly into another if the cosine of the angle between their angular momenta is below
+# this [-]: their bodies turn in nearly opposite senses.
+OPPOSITE = -0.9
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """Position and velocity of start and goal, NaN where nothing is known.
 
-    Near an attractor an end that leaves something open is where the other end coasts.
+    Near an attractor an end that leaves something open gets the state to which the other end coasts.
     """
     ends, times = (problem.start, problem.goal), (0.0, duration)
     states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
@@ -39,7 +44,7 @@ def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.nd
 
 
 def velocity_change_between(problem: TransferProblem, states: Any) -> float:
-    """About what many revolutions from one orbit to another take [m/s]; see `Spiral.velocity_change`."""
+    """The velocity change of many revolutions from one orbit to another [m/s]; see `Spiral.velocity_change`."""
     attractor = problem.attraction.lone
     assert attractor is not None
     start, goal = _from_center(problem, attractor, states)
@@ -59,13 +64,13 @@ def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Sp
 
 
 def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:
-    """Paths of an orbit that changes evenly between two states around a lone attractor, each with two facts.
+    """Paths of an orbit that changes evenly between two states around a lone attractor: (path, turns, sure).
 
-    They are its revolutions, and whether it is sure to be near the best: a nearly round orbit that need
-    not go beyond those of the ends for its phase. First the path whose number of revolutions fits the
-    duration best, and where none fits well one with one more and one less; or only that with so many
-    `more`. None where an end is open or the orbits are too different. A path is a function of the
-    fractions of the duration.
+    A path is a function of the fractions of the duration, and `turns` are its whole revolutions. `sure` says
+    that it is near the best path: the orbit is nearly round and meets its phase without going beyond the
+    orbits of the ends. The first path has the number of revolutions that fits the duration best; where none
+    fits well, one with one revolution less and one with one more follow. With `more` there is only the path
+    of that many revolutions more. There is none where an end is open or the orbits are too different.
     """
     attractor = problem.attraction.lone
     if attractor is None or not (problem.start.anchored and problem.goal.anchored):
@@ -102,7 +107,7 @@ def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: b
         return None
     start, goal = _from_center(problem, attractor, states)
     if not (np.any(start[0]) and np.any(goal[0])):
-        # in the attractor itself: refused, in words, when the effects are looked at
+        # An end in the attractor itself is refused later, when the effects are evaluated there.
         return None
     center = np.pad(attractor.place(problem.dimension), (0, 3 - problem.dimension))
     spiral = Spiral(attractor.mu, center, duration, start, goal, from_goal)
@@ -110,7 +115,7 @@ def _spiral(problem: TransferProblem, duration: float, states: Any, from_goal: b
 
 
 def _end_of(spiral: Spiral, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity at the end that the motion decides."""
+    """Position and velocity of a spiral at its open end, which the motion decides."""
     q, v = spiral.states(np.array([0.0 if spiral.from_goal else 1.0]))
     return (q[0] + spiral.center)[:dimension], v[0, :dimension]
 
@@ -118,7 +123,8 @@ def _end_of(spiral: Spiral, dimension: int) -> tuple[np.ndarray, np.ndarray]:
 def _carried(problem: TransferProblem, known: tuple, begin: float, end: Boundary, finish: float) -> tuple:
     """A state at an open end, reached by coasting there from the known end.
 
-    Onto an orbit: half the time on the one and half on the other, then as a spiral leads there.
+    To an end on an orbit the body coasts for half of the time on the known orbit and for half on that one.
+    Then spirals between the two improve the place.
     """
     middle = 0.5 * (begin + finish)
     state = _drift(problem, begin, middle, known)
@@ -150,6 +156,8 @@ def _turned(problem: TransferProblem, state: tuple, to: np.ndarray) -> np.ndarra
     q, v = state
     center = problem.attraction.center
     q, to, v = (np.pad(x, (0, 3 - len(x))) for x in (q - center, to - center, v))
+    # The velocity keeps its parts along and across the direction to the attractor, and its size falls with the
+    # root of the distance, as on circles.
     up, across = (unit @ v for unit in (_direction(q), _direction(np.cross(np.cross(q, v), q))))
     turned = up * _direction(to) + across * _direction(np.cross(np.cross(q, v), to))
     return np.sqrt(np.linalg.norm(q) / np.linalg.norm(to)) * turned[: len(center)]

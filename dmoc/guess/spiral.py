@@ -32,7 +32,7 @@ class Spiral:
 
     @property
     def eccentricity(self) -> float:
-        """The larger of the two ends'."""
+        """Eccentricity of the end where it is larger [-]."""
         return float(np.linalg.norm(self._elements[1], axis=1).max())
 
     @property
@@ -42,12 +42,13 @@ class Spiral:
 
     @property
     def velocity_change(self) -> float:
-        """About what it takes under a small thrust [m/s], after T. N. Edelbaum, ARS Journal 31 (1961)."""
+        """Rough velocity change under a small thrust [m/s], after T. N. Edelbaum, ARS Journal 31 (1961)."""
         h, e = self._elements
         lengths = np.linalg.norm(h, axis=1)
         slow, fast = sorted(self.mu / lengths)
         tilt = np.arccos(np.clip(h[0] @ h[1] / lengths.prod(), -1.0, 1.0))
         across = np.cos(min(0.5 * np.pi * tilt, np.pi))
+        # Edelbaum's law holds between circles; a change of the eccentricity adds about V / 2 for each unit.
         circles = np.sqrt(slow**2 + fast**2 - 2 * slow * fast * across)
         return float(circles + 0.5 * fast * np.linalg.norm(e[1] - e[0]))
 
@@ -84,22 +85,30 @@ def _turning() -> ca.Function:
     mu, duration = ca.SX.sym("mu"), ca.SX.sym("duration")
     share = ca.vertcat(1 - fraction, fraction)
     h, e = ends[:, :2] @ share, ends[:, 2:] @ share
-    # the length of h does not shrink as it tilts, and e and the direction stay in the plane
+    # A straight line between two vectors h of different direction is too short in between: its length is set.
+    # Then e and the direction are put back into the plane across h.
     h = h * (ca.dot(share, ca.vertcat(ca.norm_2(ends[:, 0]), ca.norm_2(ends[:, 1]))) / ca.norm_2(h))
     square = ca.sumsqr(h)
     e = e - h * (ca.dot(h, e) / square)
     u = direction - h * (ca.dot(h, direction) / square)
     u = u / ca.norm_2(u)
+    # Near the open side of a parabola or hyperbola r would be infinite: it is at most 20 h^2 / mu.
     r = square / mu / ca.fmax(1 + ca.dot(e, u), 0.05)
     rate = duration / r**2 * ca.cross(h, direction)
     given = [fraction, direction, ends, mu, duration]
     return ca.Function("turning", given, [rate, r * u, mu / square * ca.cross(h, e + u)])
 
 
-# The share of the way between two orbits, x + bend x (1 - x), grows all along for a bend within these;
-# beyond, the speed leaves that between the orbits, by no more than a tenth.
-MOST_BENT, MOST_BEYOND = 0.9, 0.1
-SAMPLES_A_TURN, ROUNDS = 100, 5
+# After the fraction x of the time a winding has gone x + bend x (1 - x) of the way between two orbits, with a
+# bend of at most this size [-]: it would no longer grow all along with a bend beyond 1.
+MOST_BENT = 0.9
+# A bend that is not enough is exceeded by at most this [-]: the speed then leaves the range between both
+# orbits, by no more than a tenth.
+MOST_BEYOND = 0.1
+# The time along a winding is summed up at this many places a revolution.
+SAMPLES_A_TURN = 100
+# The number of revolutions is corrected at most this many times, each time by the time that the last one takes.
+ROUNDS = 5
 
 
 def _axes(h: Any, k: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from dmoc.scene.problem import TransferProblem
 def starting_guess(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
-    """A guess on the mesh, from what is given, else from the problem's own, else from its physics.
+    """A guess on the mesh: from `given`, else from the problem's own guess, else from its physics.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def starting_guess(
     else:
         position = _given_path(problem, given, duration, fractions)
         ends = _end_states(problem, duration)[1::2]
-        # a smooth path around an attractor is worth its forces, and through them its multipliers
+        # A smooth path around an attractor gives forces, and through them multipliers, to start from.
         spiral = callable(given) and problem.attraction.lone is not None
     if not np.isfinite(position).all():
         node = int(np.argmin(np.isfinite(position).all(axis=1)))
@@ -70,9 +70,10 @@ def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
 def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
     """The controls that take the body along a guess, by the discrete equations; within the limits.
 
-    A path that meets its equations also has multipliers near the right ones, by least squares.
+    From a path that meets its equations Ipopt finds multipliers near the right ones, by least squares.
     """
     n, rule = problem.dimension, scheme(guess.order)
+    # Only where the controls are the force, or the force and its magnitude, do the equations give them.
     more = problem.actuator.labels(n)[n:]
     if guess.control.shape[1] < n or more not in ((), ("throttle",)):
         return guess.control
@@ -86,6 +87,7 @@ def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
     if guess.hold:
         force = np.einsum("j,jkn->kn", rule.weights, force[at])
     thrust, limit = np.linalg.norm(force, axis=1, keepdims=True), problem.actuator.force_limit()
+    # All forces are scaled down together until the largest keeps the limit: the path in between stays smooth.
     control = np.hstack([force, thrust]) if more else force
     return control if limit is None else control * min(1.0, limit / (thrust.max() or limit))
 
@@ -95,8 +97,9 @@ def guess_duration(problem: TransferProblem) -> float:
 
     With a force limit: from rest to rest over the distance and the change of velocity at full
     force, and a fifth more; between two places near an attractor as long as the default path needs;
-    where the angle on an orbit is open, over the distance from the attractor
-    or the change of the orbit, whatever is longer. Otherwise the geometric mean of the bounds.
+    where the place on an orbit is open, the time for the change of the distance from the attractor or that
+    for the change of the orbit, whichever is longer, and a fifth more. Otherwise the geometric mean of the
+    bounds.
     """
     shortest, longest = problem.duration_bounds
     if not problem.free_duration:
@@ -154,7 +157,7 @@ def _ends_in_pairs(problem: TransferProblem, duration: float) -> tuple:
 
 
 def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarray) -> tuple:
-    """Positions, the velocities of both ends, and whether the path is worth its forces."""
+    """Positions, the velocities of both ends, and whether the forces along the path are worth starting from."""
     q0, v0, q1, v1 = _end_states(problem, duration)
     if not problem.attraction.sources:
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False

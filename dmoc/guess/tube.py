@@ -13,7 +13,8 @@ from dmoc.motion.path import POSITION_BOUNDS, DiscretePath
 from dmoc.parts.constraint import Constraint
 from dmoc.scene.problem import TransferProblem
 
-# Half the width of the tube over the distance from the attractor.
+# A node may leave its place in the guess by this part of its distance from the attractor [-], along each axis:
+# half of the width of the tube.
 WIDTH = 0.4
 
 
@@ -52,6 +53,6 @@ def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | 
 
 
 def out_of_tube(path: DiscretePath) -> DiscretePath:
-    """An answer within a tube, to go on from without it."""
+    """An answer within a tube without the multipliers of the tube, which the problem itself does not have."""
     multipliers = {key: value for key, value in path.multipliers.items() if key != POSITION_BOUNDS}
     return replace(path, multipliers=multipliers)

@@ -21,9 +21,9 @@ class Winding:
     The mean square of the thrust per unit mass is then (dV/dt)^2 + 2 V^2 (di/dt)^2 + 0.4 V^2 (de/dt)^2 (the
     best thrust swings with the angle L: across as cos L, along and up as 2 cos L and sin L), so the
     optimum is a straight line in polar coordinates, passed evenly. The body moves as fast as on the orbit
-    of the moment. The number of revolutions is the one that takes about the duration, or so many `more`;
-    what is left goes into an earlier or later change of the orbit, and if that is not enough into a higher or
-    lower orbit on the way, by a parabola: the least effort for a phase alone.
+    of the moment. The number of revolutions is the one that takes about the duration, plus `more`; the time
+    that is left over goes into an earlier or later change of the orbit, and if that is not enough into a
+    higher or lower orbit on the way, by a parabola: the least effort for a phase alone.
     """
 
     mu: float
@@ -43,12 +43,13 @@ class Winding:
 
     @property
     def eccentricity(self) -> float:
-        """The larger of the two ends'."""
+        """Eccentricity of the end where it is larger [-]."""
         return max(float(np.hypot(*elements[1:3])) for elements, _ in self._ends)
 
     @cached_property
     def turns(self) -> int:
         """Whole revolutions beyond the angle between the ends."""
+        # The time is nearly proportional to the angle, so their ratio corrects any first number.
         turns = 10
         for _ in range(ROUNDS):
             taken, known = self._time(turns) or self._time(turns + 1), turns
@@ -64,7 +65,7 @@ class Winding:
 
     @cached_property
     def bend(self) -> float:
-        """How much earlier than evenly the orbit changes; beyond 0.9, how far above or below both orbits."""
+        """How much earlier than evenly the orbit changes [-]; beyond 0.9 it goes above or below both."""
 
         def excess(bend: float) -> float:
             return self._time(self.turns, bend) - self.duration
@@ -72,6 +73,7 @@ class Winding:
         if abs(excess(0.0)) < 1e-6 * self.duration:
             return 0.0
         most = MOST_BENT + MOST_BEYOND
+        # Where no bend meets the duration, the one is taken that misses it least.
         if excess(-most) * excess(most) > 0:
             return min(0.0, -most, most, key=lambda bend: abs(excess(bend)))
         return root(excess, -most, most, 1e-6)
@@ -94,6 +96,7 @@ class Winding:
         time = self._even(at)
         bent = float(np.clip(bend, -MOST_BENT, MOST_BENT))
         speed, share = self._line(time + bent * time * (1 - time))
+        # Beyond the largest bend a parabola in the speed leads above or below both orbits.
         upward = 1 if last[0] >= first[0] else -1
         speed = speed * (1 - 4 * upward * (bend - bent) * time * (1 - time))
         others = first[1:, None] + share * (last - first)[1:, None]
@@ -108,8 +111,9 @@ class Winding:
 
     @cached_property
     def _angle(self) -> float:
-        """What changes of e and of the plane cost as an angle between speeds, the costs of the two added."""
+        """The angle between the speeds of both ends whose cost is that of the changes of e and of the plane."""
         (first, _), (last, _) = self._ends
+        # At an angle of pi the line would pass through a speed of 0, which no orbit has.
         tilt = 4 * np.arctan(0.5 * np.linalg.norm(last[3:] - first[3:]))
         return min(float(np.sqrt(0.4 * np.sum((last - first)[1:3] ** 2) + 2 * tilt**2)), 0.75 * np.pi)
 
@@ -142,6 +146,8 @@ class Winding:
         for q, v in ((self._frame @ part for part in state) for state in (self.start, self.goal)):
             spin = np.cross(q, v)
             x, y, z = spin / np.linalg.norm(spin)
+            # Elements count from the mean plane, so 1 + z vanishes only for opposite orbits, which are left
+            # out.
             h, k = -y / (1 + z), x / (1 + z)
             first, second = _axes(h, k)
             e = np.cross(v, spin) / self.mu - q / np.linalg.norm(q)

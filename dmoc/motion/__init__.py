@@ -1,1 +1,1 @@
-"""How it moves: the discrete equations, forward in time, and an independent integrator."""
+"""Motion: the discrete equations, their march forward in time, and an independent integrator."""

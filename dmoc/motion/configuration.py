@@ -1,4 +1,4 @@
-"""What a body can do: its coordinates, what ties them together, its kinetic energy.
+"""The configuration of a body: its coordinates, the constraint between them, its kinetic energy.
 
 A configuration is q in R^size with a constraint g(q) = 0 of size - freedom entries. The columns of the
 tangent matrix Z(q), of shape (size, freedom), span the directions in which q may move: dg/dq Z = 0. Three
@@ -29,11 +29,11 @@ class Configuration(ABC):
     A frozen dataclass that derives from this has these duties:
 
     1. Name its coordinates and say how free they are: `names`, `freedom`.
-    2. Give the kinetic energy per unit mass: `kinetic`, and where a gradient would write more than is
-       needed, its derivatives: `inertia`.
+    2. Give the kinetic energy per unit mass: `kinetic`. Its derivatives, `inertia`, are CasADi's gradients
+       unless they are overridden by shorter expressions.
     3. Where there are more coordinates than freedom: the constraint `g` and the tangent matrix `tangent`.
 
-    Not its business: what acts, what pushes, meshes and units.
+    Not its business: effects, actuators, meshes and units.
     """
 
     @property
@@ -71,7 +71,7 @@ class Configuration(ABC):
 
 @dataclass(frozen=True)
 class Translation(Configuration):
-    """A point mass in so many axes: q is its position, g has no entries, Z is the identity."""
+    """A point mass in a space of 1 to 3 `axes`: q is its position, g has no entries, Z is the identity."""
 
     axes: int
 

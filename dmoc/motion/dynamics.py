@@ -1,4 +1,4 @@
-"""What acts on a body, as functions of one state: forces, momentum, energy, acceleration. All per unit mass."""
+"""Forces, momentum, energy and acceleration of a body as functions of one state, all per unit mass."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dmoc.parts.forces import FreeForce
 
 @dataclass(frozen=True)
 class Dynamics:
-    """What acts on a body and what pushes it; nothing about where it goes."""
+    """The effects that act on a body and the actuator that pushes it, without start, goal and duration."""
 
     configuration: Configuration
     effects: tuple[Effect, ...] = ()
@@ -25,7 +25,7 @@ class Dynamics:
 
     @classmethod
     def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:
-        """What acts and pushes in a transfer problem, or some of it."""
+        """The dynamics of a transfer problem, with its own effects or with others in their place."""
         return cls(
             Translation(problem.dimension), problem.effects if effects is None else effects, problem.actuator
         )
@@ -77,6 +77,7 @@ class Dynamics:
         inertia = ca.jacobian(momentum, v)
         if ca.depends_on(inertia, v):
             raise ValueError("an effect's lagrangian is not quadratic in the velocity; state it as a Force")
+        # The momentum is linear in the velocity: inertia times velocity, plus its value at rest.
         at_rest = self.point(t, q, ca.DM.zeros(self.positions), m)[1]
         return ca.Function("velocity", [t, q, p, m], [ca.solve(inertia, p - at_rest)])
 
@@ -86,6 +87,8 @@ class Dynamics:
         t, q, v, m = self.symbols()
         f = ca.SX.sym("f", self.positions)
         dldq, dldv, push = self.point(t, q, v, m)
+        # The Euler-Lagrange equation d/dt dl/dv = dl/dq + F/m, whose left side is written out by the chain
+        # rule.
         change = ca.jacobian(dldv, q) @ v + ca.jacobian(dldv, t)
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
         return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
@@ -137,7 +140,8 @@ def point_function(
 def split_effects(effects: Sequence[Effect], positions: int) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
     """Effects that look only at t, q, m, and those that look at the velocity.
 
-    The first act on a node once, not once for each step that shares it.
+    The first are evaluated once a node. The second are evaluated in each of the two steps that share a
+    node, since each step has a velocity of its own there.
     """
     t, q, v, m = state_symbols(positions)
 

@@ -1,4 +1,4 @@
-"""The rows of numbers behind each order: Lobatto points of [0, 1], weights and derivative matrix."""
+"""The numbers of the scheme of each order: Lobatto points of [0, 1], weights and derivative matrix."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.polynomial import legendre
 
 from dmoc.basics.arguments import short
 
+# The schemes have these orders, 2 s for a polynomial of degree s = 1 to 4 in each step.
 ORDERS = (2, 4, 6, 8)
 
 
@@ -98,21 +99,27 @@ def _scheme(degree: int) -> Scheme:
 def _lobatto_points(degree: int) -> np.ndarray:
     """Ends of [0, 1] and the roots of P_s', polished to round-off and made exactly symmetric."""
     slope = legendre.Legendre.basis(degree).deriv()
+    # The roots of a polynomial are eigenvalues with some rounding error; two steps of Newton's method remove
+    # it.
     inner = np.sort(np.real(slope.roots())) if degree > 1 else np.empty(0)
     for _ in range(2):
         inner = inner - slope(inner) / slope.deriv()(inner) if degree > 1 else inner
+    # The mean of the points and their mirror image is symmetric to the last bit: so is the scheme in time.
     points = np.concatenate(([-1.0], inner, [1.0]))
     return 0.5 + 0.25 * (points - points[::-1])
 
 
 def _symmetric(fractions) -> np.ndarray:
+    """Fractions 0..1 of the step as arguments -1..1 of Legendre polynomials."""
     return 2 * np.asarray(fractions, float) - 1
 
 
 def _inverse_vandermonde(points: np.ndarray) -> np.ndarray:
+    """Matrix from values at the points to coefficients of Legendre polynomials."""
     return np.linalg.inv(legendre.legvander(_symmetric(points), len(points) - 1))
 
 
 def _vander_derivative(fractions, degree: int) -> np.ndarray:
+    """Slopes of the Legendre polynomials by the fraction of the step, one column a polynomial."""
     rows = [legendre.legval(_symmetric(fractions), legendre.legder(row)) for row in np.eye(degree + 1)]
     return 2 * np.stack(rows, axis=-1)

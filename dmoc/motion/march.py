@@ -1,4 +1,4 @@
-"""Forward integration of the same scheme."""
+"""Forward integration by the variational scheme, the one that a solve optimises with."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from dmoc.motion.path import DiscretePath
 from dmoc.motion.step import step_map
 from dmoc.scene.problem import TransferProblem
 
-# Steps of one piece of a forward march: a map of 100,000 steps takes ten times longer to build than to run.
+# A forward march is built for at most this many steps and run piece by piece: a map of 100,000 steps takes
+# ten times longer to build than to run.
 PIECE = 4096
 
 
@@ -69,7 +70,7 @@ def simulate(
     duration : float, optional
         [s], if it is not the problem's.
     compensated : bool
-        Carry what each addition of a step loses to rounding on to the next step (Kahan's sum): over a
+        Carry the rounding error of each addition of a step on to the next step (Kahan's sum): over a
         million explicit steps angular momentum is then kept to the last bit. Takes up to twice as long.
 
     Returns
@@ -166,6 +167,7 @@ def rollout(
     n, steps = dynamics.positions, len(path.mesh) - 1
     advance, inputs = _advance(dynamics, path, start_time, compensated)
     states = np.zeros((advance.numel_out(0), steps + 1))
+    # Positions count from the path's first one: far from the origin their increments would lose digits.
     states[: 2 * n, 0] = np.concatenate([position - path.position[0], momentum])
     march = advance.mapaccum(min(steps, PIECE))
     for begin in range(0, steps, PIECE):
@@ -193,7 +195,7 @@ def _advance(
     if compensated:
         return _compensated(state, given, ca.vertcat(*increments[:2])), inputs
     advance = ca.Function("advance", [state, *given], [state + ca.vertcat(*increments[:2])])
-    # an explicit step has no root to find: as one plain expression it is three times as fast
+    # An explicit step has no root to find: as one plain expression it is three times as fast.
     explicit = rule.degree == 1 and not dynamics.depends_on_velocity
     return advance.expand() if explicit else advance, inputs
 
@@ -206,13 +208,13 @@ def _inputs(path: DiscretePath, start_time: float) -> list[np.ndarray]:
     times = start_time + path.duration * path.mesh[:-1]
     lengths = path.duration * np.diff(path.mesh)
     if np.array_equal(path.mesh, uniform_mesh(steps)):
-        # fractions differ by round-off, 1e-12 of a step in 20,000: steps must be equal to keep the energy
+        # The fractions of 20,000 equal steps differ by round-off, 1e-12 of a step: the energy would drift.
         lengths[:] = path.duration / steps
     return [path.mass[at], control.T, times[None], lengths[None]]
 
 
 def _compensated(state: ca.MX, given: list, increments: ca.MX) -> ca.Function:
-    """Kahan's sum of a state and its increments; as one expression CasADi would make it the plain sum."""
+    """Kahan's sum of a state and its increments, by calls that CasADi cannot simplify to the plain sum."""
     a, b = ca.SX.sym("a", state.numel()), ca.SX.sym("b", state.numel())
     add = ca.Function("add", [a, b], [a + b], {"never_inline": True})
     subtract = ca.Function("subtract", [a, b], [a - b], {"never_inline": True})

@@ -1,4 +1,4 @@
-"""Nodes of a mesh, and what is known of a path carried from one mesh to another."""
+"""Meshes: the nodes of each step, their fractions of the duration and their weights."""
 
 from __future__ import annotations
 

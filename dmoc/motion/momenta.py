@@ -20,8 +20,9 @@ def end_momenta(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Momenta per mass and velocities at the step ends [m/s], each of shape (steps+1, axes).
 
-    The discrete Legendre transforms of the steps: what leaves each step's first node, and at the
-    end what arrives there. `momenta` are the `legendre_momenta` if they are known.
+    The discrete Legendre transforms of the steps: the momentum that leaves the first node of each step
+    and, at the last node of all, the momentum that arrives there. `momenta` are the `legendre_momenta` if
+    they are known.
     """
     n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     if momenta is None:
@@ -51,12 +52,14 @@ def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> 
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
     function = remembered(make, "legendre slopes", dynamics, path.order, path.hold)
     slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    # The rows p_0 = -P_0, P_1 = .. = 0 tell how all later nodes move with q_0 and p_0.
     inner, start = slopes[:, : n * s, n:], np.zeros((steps, n * s, 2 * n))
     start[:, :, :n], start[:, :n, n:] = -slopes[:, : n * s, :n], -np.eye(n)
     try:
         moves = np.linalg.solve(inner, start)
     except np.linalg.LinAlgError:  # a step so long that its equations have no one solution
         return np.full((steps, 2 * n, 2 * n), np.inf)
+    # p_1 = P_s moves with q_0 itself and with the later nodes.
     last = slopes[:, n * s :]
     momenta = last[:, :, n:] @ moves
     momenta[:, :, :n] += last[:, :, :n]
@@ -64,7 +67,7 @@ def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> 
 
 
 def _given(path: DiscretePath, start_time: float) -> tuple:
-    """What the functions of a step are given, the steps of a path side by side."""
+    """The arguments of a function of one step for all steps of a path, side by side."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
     at, origin = step_nodes(steps, rule), path.position[0]
 

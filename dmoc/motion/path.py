@@ -13,9 +13,10 @@ from dmoc.motion.mesh import node_fractions
 
 
 class Key(NamedTuple):
-    """Which multipliers: what their index counts, of a "row" or a "column" (an unknown), of which group.
+    """The name of a group of multipliers, which belong to rows ("row") or to unknowns ("column").
 
-    `kind` is as in the layout of the NLP: "smooth", "node", "control", "step", "between" or "end".
+    `kind` says what their index counts, as in the layout of the NLP: "smooth", "node", "control", "step",
+    "between" or "end".
     """
 
     kind: str
@@ -33,10 +34,11 @@ class Key(NamedTuple):
 
 # The group of rows for the masses at the inner nodes of steps.
 INNER_MASSES = "mass_inside"
-# Multipliers of the discrete Euler-Lagrange equations: the costates.
+# The costates have this key: the multipliers of the discrete Euler-Lagrange equations.
 COSTATE = Key("smooth", "row", "dynamics")
-# Multipliers of the rows that tie an actuator's controls together, and of the bounds on positions.
+# The multipliers of an actuator's rows have this key, such as those that tie a throttle to the force.
 ACTUATOR_ROWS = Key("control", "row", "actuator")
+# The multipliers of the bounds on positions have this key, such as those of a box to stay in.
 POSITION_BOUNDS = Key("node", "column", "position")
 
 
@@ -86,8 +88,10 @@ class DiscretePath:
         old_control = old_middles if self.hold else old
         new_control = middles if hold else new
         ends = (self.start_velocity * self.duration, self.goal_velocity * self.duration)
-        # the path must be smooth: its second differences are the forces
+        # The path must stay smooth, since its second differences are the forces: linear pieces would have
+        # jumps.
         position = cubic_spline(old, self.position, ends)(new)
+        # Ends are often fixed numbers of the problem, to the last bit.
         position[0], position[-1] = self.position[0], self.position[-1]
         places = {
             "node": (old, new),
@@ -159,6 +163,7 @@ def path_scales(path: DiscretePath) -> tuple[float, float]:
     """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
     extent = path.diagonal
     ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
+    # A body that ends where it began along a line of no extent is measured by what its speed would cover.
     extent = extent or ends * path.duration or 1.0
     length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
     return extent, max(length / path.duration, ends) or extent / path.duration

@@ -1,4 +1,4 @@
-"""An independent integrator: the equations of motion, without the scheme."""
+"""An independent integrator, which knows the equations of motion but not the variational scheme."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.step import weighted
 
-# Where the independent integrator gives up: a path that needs more parts runs into a singularity.
+# The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
+# into a singularity.
 MOST_PARTS = 1_000_000
 
 
@@ -46,6 +47,7 @@ def reference(
     while parts.sum() <= MOST_PARTS:
         owner = np.repeat(np.arange(steps), parts)
         share = 1 / parts[owner]
+        # The i-th part of a step begins at i times its share of the step.
         begin = (np.arange(len(owner)) - (np.cumsum(parts) - parts)[owner]) * share
         h = path.duration * np.diff(path.mesh)[owner]
         times = start_time + path.duration * path.mesh[:-1][owner]
@@ -58,6 +60,8 @@ def reference(
         if worst.max() <= 1:
             end = states.full()[:, -1]
             return path.position[0] + end[:n], end[n : 2 * n]
+        # The error of order 8 falls with the 8th power of the number of parts, hence the root; a tenth for
+        # safety.
         parts = parts * np.where(worst > 1, np.ceil(np.clip(1.1 * worst**0.125, 2, 64)), 1).astype(int)
     return np.full(n, np.nan), np.full(n, np.nan)
 
@@ -74,10 +78,10 @@ def _control_powers(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
 
 
 def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
-    """Absolute errors [m], [m/s], [kg] that do not matter: 1e-12 of what the motion is made of."""
+    """Absolute errors [m], [m/s], [kg] that the integrator may make: 1e-12 of extent, speed and mass."""
     n, duration = path.position.shape[1], path.duration
     thrust = np.abs(control).max(initial=0.0) / path.mass.min()
-    # a body held in place has no extent: then what the thrust alone would do is the measure
+    # A body held in place has no extent: a thousandth of where the thrust alone would take it stands in.
     extent = max(np.ptp(path.position, axis=0).max(), 1e-3 * thrust * duration**2) or 1.0
     speed = max(extent / duration, np.abs(velocity).max())
     return 1e-12 * np.concatenate([np.repeat([extent, speed], n), path.mass[:1]])
@@ -112,12 +116,13 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     slopes.append(rate(begin + share, after))
     scale = tolerances + 1e-11 * ca.fmax(ca.fabs(state), ca.fabs(after))
     third, fifth = (ca.sumsqr(weighted(row, slopes) / scale) for row in weights[1:])
+    # SciPy's combination of both estimates; 1e-300 avoids 0 / 0 where nothing moves.
     error = length * fifth / ca.sqrt((fifth + 0.01 * third) * state.numel() + 1e-300)
     return ca.Function("dop853", [state, powers, t, h, begin, share, origin, tolerances], [after, error])
 
 
 def coefficients() -> tuple[np.ndarray, ...]:
-    """Of DOP853: places, slopes and weights of its stages, weights of its third and fifth order errors.
+    """DOP853's places, slopes and weights of its stages, and weights of its third and fifth order errors.
 
     They are SciPy's. Its integrators take as long to import as a small solve, so their table is read alone.
     """
@@ -132,6 +137,7 @@ def coefficients() -> tuple[np.ndarray, ...]:
 
 
 def _scipys_table() -> Any:
+    """SciPy's module of coefficients, which holds numbers alone, loaded without the package around it."""
     folder = find_spec("scipy").submodule_search_locations[0]  # type: ignore[union-attr, index]
     spec = spec_from_file_location("dop853", f"{folder}/integrate/_ivp/dop853_coefficients.py")
     table = module_from_spec(spec)  # type: ignore[arg-type]

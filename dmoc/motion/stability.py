@@ -11,18 +11,28 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import step_matrices
 from dmoc.motion.path import DiscretePath
 
-# Frozen along a path the two differ by what the path changes within a step; where the linearisation is
-# constant they must agree. Just past order 2's limit, at h omega = 2.0001, the growth is 1.02 a step.
-GROWTH, GROWTH_CONSTANT = 1.05, 1.001
-# Eigenvalues are found where h omega may exceed the first, and at as many of the other steps as the second.
-NEGLIGIBLE, LOOKED_AT = 0.1, 200
-# A step this short, in units of the fastest rate, is stable by far whatever the order.
+# A one-step matrix may grow at most this many times as much a step as the exact flow: both are frozen at the
+# step and differ by the changes of the linearisation within it.
+GROWTH = 1.05
+# The same limit where the linearisation is constant, so that both must agree. Just past the limit of order 2,
+# at h omega = 2.0001, the growth is 1.02 a step.
+GROWTH_CONSTANT = 1.001
+# Eigenvalues are found for every step whose h omega may exceed this: below a tenth no scheme is unstable, and
+# a mesh of many steps is there almost everywhere.
+NEGLIGIBLE = 0.1
+# Eigenvalues are found for this many steps with the largest h omega in any case: a report tells h omega.
+LOOKED_AT = 200
+# A step whose h omega is below this is stable by far at any order: nothing is computed before the solve.
 HARMLESS = 0.5
 
 
 @dataclass(frozen=True)
 class Growth:
-    """Largest spectral radius of a one-step matrix over the exact flow's, what is allowed, and h omega."""
+    """The growth of errors in one step of a path, and the limit for it.
+
+    `value` is the largest spectral radius of a one-step matrix over that of the exact flow, `frequency` the
+    largest h omega, and `constant` says whether the linearisation is the same all along the path.
+    """
 
     value: float
     limit: float
@@ -44,7 +54,6 @@ def growth_along(
         return Growth(np.inf, limit, np.inf, constant)
     h, fastest = path.duration * np.diff(path.mesh), _rate_bound(flow)
     reach = h * np.maximum(fastest[:-1], fastest[1:])
-    # below a tenth no scheme is unstable, and a mesh of many steps is there almost everywhere
     chosen = reach > NEGLIGIBLE
     chosen[np.argsort(reach)[-LOOKED_AT:]] = True
     looked_at = np.flatnonzero(chosen)
@@ -56,7 +65,7 @@ def growth_along(
 
 
 def _rate_bound(flow: np.ndarray) -> np.ndarray:
-    """No eigenvalue of [[0, 1], [K, G]] is larger than the root of x^2 = |G| x + |K| [1/s]."""
+    """A bound of the rates [1/s]: no eigenvalue of [[0, 1], [K, G]] exceeds the root of x^2 = |G| x + |K|."""
     n = flow.shape[1] // 2
     stiffness, damping = (np.linalg.norm(part, axis=(1, 2)) for part in (flow[:, n:, :n], flow[:, n:, n:]))
     return 0.5 * (damping + np.sqrt(damping**2 + 4 * stiffness))
@@ -87,6 +96,8 @@ def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, 
     longest = np.diff(guess.mesh).max()
     order, degree = guess.order, guess.order // 2
     nodes = np.linspace(0, len(guess.position) - 1, 2 * degree + 1).round().astype(int)
+    # Where the linearisation is constant all steps of one length are alike: two of the longest one stand for
+    # all.
     probe = replace(
         guess,
         mesh=np.array([0.0, 0.5, 1.0]),

@@ -59,7 +59,8 @@ def step_momenta(scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequenc
     """
     v = step_velocities(scheme, h, q)
     at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
-    # dl/dv is v and what effects add: the first part is one constant matrix, the second often nothing
+    # dl/dv is v plus the momentum that effects add. The sum over v is one constant matrix times the
+    # displacements; the second part is zero for most effects.
     added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
     inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
     moves = [position - q[0] for position in q[1:]]
@@ -101,13 +102,15 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     if s == 1 and not dynamics.depends_on_velocity:
         increments = _increments(scheme, point, t, h, q, [h * (p + 0.5 * h * kick)], m, push)
         return ca.Function("step", given, increments, names, ["dq", "dp", "v"])
-    # the unknowns are displacements in units of h times a typical speed: of order 1 whatever the scene
+    # The unknowns are displacements over h times a typical speed, which makes them of order 1 in every scene;
+    # 1e-300 keeps that speed above zero for a body at rest that nothing pushes.
     speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
     y = ca.SX.sym("y", n * s)
     moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
     momenta = step_momenta(scheme, point, t, h, [q, *[q + move for move in moves]], m, push)
     rows = ca.Function("rows", [y, *given], [ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed])
-    # convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off
+    # Convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off. The size of
+    # the rows decides nothing.
     settings = {"abstol": 1e-300, "abstolStep": 1e-11, "max_iter": 30, "error_on_fail": False}
     newton = ca.rootfinder("newton", "fast_newton", rows, settings)
     first = [c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]

@@ -1,1 +1,1 @@
-"""From motion to numbers for Ipopt."""
+"""The NLP: from motion to numbers for Ipopt, and the way back."""

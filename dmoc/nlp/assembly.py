@@ -17,9 +17,11 @@ import numpy as np
 
 from dmoc.basics.compiled import compiled
 
-# How many entries that belong to one place are picked one by one; more are added up as a whole.
+# Sums of at most this many entries are made by picking one entry after the other; the rest of a longer one, as
+# for a free duration that is in every step, is added up at once.
 MOST_PICKED = 8
-# Numbers that are the same for so long are written as one.
+# A vector whose runs of equal numbers are at least this long on average is put together from one number a run:
+# that saves time in the build.
 LEAST_RUN = 100
 
 
@@ -30,10 +32,10 @@ class Kernel:
     Attributes
     ----------
     functions : dict of Function
-        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian", of z
-        and those d and p that are needed; "hessian" also of multipliers and weight.
+        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian". They
+        take z and those d and p that rows and cost depend on; "hessian" also takes multipliers and weight.
     used : lists of int
-        Which d and which p these are.
+        Indices of those d and of those p.
     jacobian, hessian : Sparsity
         Of the rows, and of the upper triangle of weight cost + multipliers . rows.
     costly : bool
@@ -168,7 +170,8 @@ def assemble(
         g,
         ca.Function("objective", given, [f]),
         ca.Function("constraints", given, [g]),
-        # the hooks also have f or g as an output, which Ipopt never asks for; a constant costs nothing
+        # CasADi wants f or g as a further output of these functions. Ipopt never asks for it, so a constant
+        # that costs nothing stands there.
         ca.Function("nlp_grad_f", given, [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
         ca.Function("nlp_jac_g", given, [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
         ca.Function("nlp_hess_l", [*given, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]),
@@ -180,7 +183,7 @@ def _nonzeros(matrix: ca.SX) -> ca.SX:
 
 
 def _constant(values: np.ndarray) -> ca.MX:
-    """Numbers as a vector, put together from few pieces where there are long runs of the same."""
+    """Numbers as a vector, put together from few pieces where there are long runs of equal numbers."""
     starts = np.flatnonzero(np.diff(values, prepend=np.nan))
     if len(starts) > len(values) / LEAST_RUN:
         return ca.MX(ca.DM(values))
@@ -197,7 +200,7 @@ def _columns(vector: ca.MX, places: np.ndarray) -> ca.MX:
 def _evaluated(
     block: Block, unknowns: ca.MX, parameters: ca.MX, multipliers: ca.MX, weight: ca.MX, compiled: bool
 ) -> Iterator[tuple[str, ca.MX]]:
-    """Every result of a block that is not zero by its structure: one evaluation a column."""
+    """Kind and value of every result of a block that is not zero by its structure, one column an evaluation."""
     kernel, count = block.kernel, block.count
     d, p = kernel.used
     given = [_columns(unknowns, block.columns), ca.DM(block.values[d]), ca.repmat(parameters[p], 1, count)]
@@ -231,7 +234,7 @@ def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], scale: np.ndarray) -> ca
 
 
 def _matrix(pieces: Sequence[tuple], row_scale: np.ndarray, column_scale: np.ndarray) -> ca.MX:
-    """The same for the nonzeros of a matrix, whose places are column * rows + row, with both their scales."""
+    """A sparse matrix of such sums: places are column * rows + row, and both scales are multiplied."""
     rows, columns = len(row_scale), len(column_scale)
     if not pieces:
         return ca.MX(rows, columns)
@@ -251,7 +254,7 @@ def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, coun
 
     Entries are picked, not multiplied by a matrix of ones: that takes a tenth of the time to build.
     """
-    # one entry more, which is zero, stands where there is nothing to add
+    # One more entry, a zero, is picked for every place to which nothing is added.
     values, nothing = ca.veccat(*[piece for piece, _ in pieces], 0), len(order)
     picked = np.full(len(counts), nothing)
     picked[counts > 0] = order[starts[counts > 0]]
@@ -259,7 +262,7 @@ def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, coun
     for turn in range(1, min(counts.max(), MOST_PICKED)):
         some = np.flatnonzero(counts > turn)
         total[some.tolist()] += values[order[starts[some] + turn].tolist()]
-    # an unknown that is in every step, as a free duration is
+    # Long sums belong to an unknown that is in every step, such as a free duration.
     for place in np.flatnonzero(counts > MOST_PICKED):
         begin, end = starts[place] + MOST_PICKED, starts[place] + counts[place]
         total[int(place)] += ca.sum1(values[order[begin:end].tolist()])

@@ -13,12 +13,15 @@ from dmoc.nlp.ipopt import ALWAYS
 from dmoc.nlp.solving import NLP
 from dmoc.scene.problem import TransferProblem
 
-# The weight of the effort beside the slack: it makes the path unique, and moves the slack by about as much.
+# The objective is the sum of the slacks plus this part of the scaled effort [-]: the effort makes the path
+# unique, and changes the slack by about this part.
 EFFORT_SHARE = 1e-4
-# A run that takes more iterations than this is given up: the others took fewer than 100.
+# A run of the elastic NLP is given up after this many iterations: those that converged took fewer than 100.
 MOST_ITERATIONS = 200
-# A row is met if its scaled violation is below this.
+# A row counts as met if its scaled violation is below this [-].
 MET = 1e-7
+# Ipopt gets these options where it starts from an answer near by: it stays within 1e-8 of the limits that act,
+# and the barrier begins low.
 WARM = {
     "ipopt.warm_start_init_point": "yes",
     "ipopt.mu_init": 1e-4,
@@ -32,7 +35,7 @@ WARM = {
 
 @dataclass(frozen=True)
 class Relaxed:
-    """What one elastic NLP gave: the slacks, the path, whether it keeps all rows but for the slacks."""
+    """The answer of one elastic NLP: the slacks, the path, and whether it keeps all rows with these slacks."""
 
     slack: np.ndarray
     path: DiscretePath
@@ -57,14 +60,14 @@ class Relaxation:
     columns : array of int
         Unknowns whose limits give way by the first slack.
     below, above : arrays
-        How far their lower and upper limits do.
+        How far the lower and the upper limits of these unknowns give way for a slack of 1, scaled.
     """
 
     def __init__(self, nlp: NLP, rows: np.ndarray, columns=(), below=(), above=(), least: float = 0.0):
         self.nlp, self.least, self.count = nlp, least, rows.shape[1]
         self.columns = np.asarray(columns, int)
         number = len(self.columns)
-        # each of these unknowns becomes a row of its own, once for either side
+        # A bound on an unknown has no place for a slack, so these bounds become rows, one for either side.
         pick = ca.DM.triplet(
             list(range(number)), self.columns.tolist(), ca.DM.ones(number), number, nlp.columns.size
         )
@@ -108,6 +111,7 @@ class Relaxation:
         lbx, ubx, lbg, ubg = self.nlp.bounds(problem)
         low, high = lbx[self.columns], ubx[self.columns]
         start, free = np.clip(self.nlp.pack(guess), lbx, ubx), np.full(self.count, np.inf)
+        # The bounds of these unknowns are now rows, which give way; as bounds they would still be hard.
         lbx[self.columns], ubx[self.columns] = -np.inf, np.inf
         none = np.full(len(low), np.inf)
         solver = self.solver if near is None else self.warm

@@ -1,4 +1,4 @@
-"""One run of Ipopt on one sparse NLP, and what its status means."""
+"""One run of Ipopt on one sparse NLP, and the meaning of its status."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from dmoc.nlp.assembly import Assembly
 
 
 class Status(NamedTuple):
-    """What Ipopt's return codes are called here, and what to try after one."""
+    """Return codes of Ipopt that mean the same to a user, and the advice that follows one of them."""
 
     codes: tuple[str, ...]
     advice: str = ""
 
 
+# Every status of a solve by name, with Ipopt's return codes that lead to it and the advice for a user.
 STATUSES = {
     "solved": Status(("Solve_Succeeded", "Solved_To_Acceptable_Level")),
     "infeasible": Status(
@@ -53,9 +54,10 @@ STATUSES = {
     ),
     "failed": Status((), "try another number of steps, another order, hold=True, or another guess"),
 }
+# The name of the status that each of Ipopt's return codes leads to.
 _STATUS_OF = {code: name for name, status in STATUSES.items() for code in status.codes}
 
-# Settings of every run, whatever the problem: exact derivatives are given, scaling is done outside.
+# Every run has these settings: derivatives are given, so CasADi makes none, and the NLP is scaled already.
 ALWAYS: dict[str, Any] = {
     "no_nlp_grad": True,
     "calc_lam_p": False,
@@ -70,7 +72,7 @@ ALWAYS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What one run of Ipopt on one mesh gave, scaled."""
+    """The answer of one run of Ipopt on one mesh, scaled."""
 
     x: np.ndarray
     lam_x: np.ndarray
@@ -126,13 +128,14 @@ def run(solver: ca.Function, **given: np.ndarray) -> Answer:
 
 
 class Interrupt:
-    """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate is worth it."""
+    """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate be lost."""
 
     def __init__(self) -> None:
         self.seen = False
         self._previous: Any = None
 
     def __enter__(self) -> Interrupt:
+        # Python lets no other thread handle signals.
         if threading.current_thread() is threading.main_thread():
             self._previous = signal.signal(signal.SIGINT, self._see)
         return self
@@ -146,10 +149,11 @@ class Interrupt:
 
 
 class Watch(ca.Callback):
-    """Follows the iterations: tells of each, and stops when `interrupt` has seen a Ctrl-C or it is told to.
+    """Follows the iterations: tells of each, and stops when `interrupt` has seen a Ctrl-C or `tell` says so.
 
-    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs. It
-    would print an exception of `tell` and go on: this stops, and keeps it as `error` to be raised.
+    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs. CasADi
+    would also print an exception of `tell` and go on: the watch stops the run and keeps the exception as
+    `error`, to be raised afterwards.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where every unknown and every row of an NLP stands, what it is called and how it is scaled."""
+"""The places, names and scales of all unknowns and rows of an NLP."""
 
 from __future__ import annotations
 
@@ -68,6 +68,7 @@ class Group:
         """Such as `dynamics[17].y` or `goal.velocity.z`."""
         index, component = divmod(place - self.start, len(self.labels))
         label = self.labels[component]
+        # A user knows the ends of the path as start and goal, not by the number of a node.
         if self.name == "position" and index in (0, self.count - 1):
             return f"{'start' if index == 0 else 'goal'}.position.{label}"
         return ".".join(filter(None, [self.name + ("" if self.kind == "end" else f"[{index}]"), label]))

@@ -38,6 +38,7 @@ class Placement:
         self.rows = Layout()
         self._lower: list[np.ndarray] = []
         self._upper: list[np.ndarray] = []
+        # A row of motion is a momentum per unit mass [m/s]; as an impulse over force times time it is near 1.
         impulse = problem.mass / (units.force * units.time)
         axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)

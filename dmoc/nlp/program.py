@@ -94,7 +94,7 @@ class Program:
         return lower / scale, upper / scale, low, high
 
     def _release(self, problem: TransferProblem, low: np.ndarray, high: np.ndarray) -> None:
-        """Free the limits on a boundary state that is fixed as a whole: nothing is left there to move.
+        """Free the limits on a boundary state that is fixed as a whole: no unknown is left there to meet them.
 
         Whether such a state keeps the limits is checked when the problem is made.
         """
@@ -150,7 +150,8 @@ class Program:
     def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
 
-        A multiplier that stands once a node or a step is a density: over its share of the duration.
+        A multiplier of which there is one a node or a step is divided by the share of the duration that belongs
+        to it: such a density does not change with the mesh.
         """
         shares = {"node": node_weights(self.mesh, self.scheme), "step": np.diff(self.mesh)}
         shares["control"] = shares["step" if self.hold else "node"]
@@ -192,7 +193,11 @@ class Program:
 
 
 def _built_alike(new: Any, old: Any) -> bool:
-    """Whether two parts make the same rows; a user's own may build in what it does not call adjustable."""
+    """Whether two parts make the same rows.
+
+    A user's own part that names nothing adjustable may build any of its numbers into its rows: it must be
+    equal in all of them.
+    """
     structure = [(type(part), getattr(part, "structure", None)) for part in (new, old)]
     known = type(new).__module__.startswith("dmoc.")
     return structure[0] == structure[1] and (known or _built_in(new) == _built_in(old))
@@ -204,11 +209,12 @@ def _built_in(part: Any) -> dict[str, Any]:
 
 
 def _equal(new: Any, old: Any) -> bool:
-    """Equal in fields and in what a user's own class has beside those that it inherits."""
+    """Whether two parts have equal attributes, those included that are no fields of a dataclass."""
     return type(new) is type(old) and vars(new) == vars(old)
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
+    """Set both bounds of some unknowns to values, except where a value is NaN: free."""
     known = ~np.isnan(values)
     lower[places[known]] = upper[places[known]] = values[known]
 

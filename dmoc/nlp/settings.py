@@ -10,11 +10,12 @@ from dmoc.scene.problem import TransferProblem
 
 
 def tolerance(mesh: np.ndarray, degree: int, limited: bool) -> float:
-    """Of scaled rows and gradients.
+    """Ipopt's tolerance for scaled rows and gradients [-].
 
-    Rows are momenta: an error of 1e-10 in each is one of 1e-10 N in the force, so finer meshes ask for
-    less, down to the rounding of positions over the shortest step. Without limits the last iterations
-    converge quadratically: another digit or two cost one of them at most.
+    A row is the momentum of one node, over a share of the duration that falls with the number of steps: for the
+    same error of the force the tolerance must fall as well, down to the rounding of positions over the
+    shortest step. Without limits the last iterations converge quadratically: another digit or two cost one of
+    them at most.
     """
     floor = 20 * np.finfo(float).eps * degree / np.diff(mesh).min()
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
@@ -28,10 +29,12 @@ def settings_for(
     `warm` if multipliers are known, `carried` if they and the path come from the answer on a coarser mesh.
     """
     settings: dict[str, Any] = {
+        # Limits are kept as they are given: Ipopt would loosen them by 1e-8.
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.tol": tolerance(mesh, degree, problem.limited),
         "ipopt.constr_viol_tol": 1e-6,
-        # Some optima leave a direction open, along which Ipopt would go on: ten iterations without gain end it.
+        # At some optima the objective does not change in one direction, along which Ipopt would wander on: a
+        # run ends after ten iterations without a gain.
         "ipopt.acceptable_iter": 10,
         "ipopt.acceptable_tol": 1e-6,
         "ipopt.acceptable_constr_viol_tol": 1e-10,
@@ -39,14 +42,15 @@ def settings_for(
         "ipopt.max_iter": 1000,
     }
     if problem.limited:
-        # with barrier terms the default matching delays pivots: 8 s instead of 0.15 s an iteration was seen
+        # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
         settings["ipopt.mumps_permuting_scaling"] = 0
         if len(mesh) > 1000:
             settings["ipopt.mumps_pivot_order"] = 5
     settings |= _barrier(problem, warm, carried)
     if warm:
-        # interpolated values break the equations: 1e-8 away from a limit the first steps would be cut short.
-        # A thousandth takes 1,173 iterations, not 1,309, on the last meshes of eleven problems, 42 variants.
+        # Values interpolated from a coarser mesh break the equations: from 1e-8 away from a limit the first
+        # steps would be cut short. A distance of 1e-3 takes 1,173 iterations, not 1,309, on the last meshes of
+        # eleven problems in 42 variants.
         push = 1e-3 if carried else 1e-8
         pushed = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
         settings |= {"ipopt.warm_start_init_point": "yes", "ipopt.mu_init": 1e-6}
@@ -55,15 +59,17 @@ def settings_for(
 
 
 def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, Any]:
-    """How the barrier falls, where it is not best that it only falls."""
+    """Options for the barrier parameter, where it is better that it may also rise; none elsewhere."""
     rounded = problem.actuator.smoothing is not None
     if rounded and problem.objective.metered:
-        # with |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations
+        # With |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations.
         settings: dict[str, Any] = {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
-        # near the optimum full steps can go to and fro, 2,700 of them were seen, for hardly less violation
+        # Near the optimum full steps can go to and fro, 2,700 times in one case, each for hardly less violation
+        # of the rows: a larger gamma_theta accepts a step only for clearly less.
         return settings | ({"ipopt.gamma_theta": 1e-2} if warm else {})
     if problem.limited and not rounded and warm and not carried:
-        # another start or limit: 78 iterations instead of 143 over eleven changes of four problems; from
-        # another mesh, or with another rounding of |F|, it would be up to 13 times as many
+        # After a change of the start or of a limit this takes 78 iterations instead of 143, over eleven changes
+        # of four problems. After a change of the mesh or of the rounding of |F| it would take up to 13 times as
+        # many.
         return {"ipopt.mu_strategy": "adaptive"}
     return {}

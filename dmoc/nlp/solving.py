@@ -22,7 +22,8 @@ from dmoc.results.facts import Level, Provenance
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
-# (order, steps, iteration, objective, name of the worst row, its scaled violation) -> whether to stop
+# A user's function that follows a solve takes (order, steps, iteration, objective, name of the worst row, its
+# scaled violation) and says whether to stop.
 Progress = Callable[[int, int, int, float, str, float], bool | None]
 
 
@@ -67,7 +68,7 @@ class NLP(Program):
         return run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
 
     def level(self, answer: Answer, build_s: float) -> Level:
-        """What one run took, for the ladder."""
+        """One run as a level of the ladder: its mesh, iterations, times and status."""
         return Level(
             order=self.scheme.order,
             steps=len(self.mesh) - 1,

@@ -1,10 +1,10 @@
-"""What one node, one step and the two ends contribute to the NLP, as small functions of few unknowns.
+"""The contributions of one node, one step and the two ends to the NLP, as small functions of few unknowns.
 
 An effect that looks only at time, position and mass acts once a node, with the node's whole weight;
 one that looks at the velocity acts in every step with that step's own velocities. Either way the
 rows add up to the discrete Euler-Lagrange equations of `dmoc.motion.step`. Nothing here depends on the
-mesh, on units or on numbers that may change from solve to solve: what was written down once serves
-every mesh, and every problem of the same structure.
+mesh, on units or on numbers that may change from solve to solve: a stencil that was written down once
+serves every mesh, and every problem of the same structure.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ from dmoc.nlp.layout import Owner
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
-ALL, FIRST, LAST = slice(None), slice(0, 1), slice(-1, None)
+# A stencil takes all entries of a group, one for each evaluation.
+ALL = slice(None)
+# A stencil takes the first entry of a group: that of the start.
+FIRST = slice(0, 1)
+# A stencil takes the last entry of a group: that of the goal.
+LAST = slice(-1, None)
 
 
 class Limit(NamedTuple):
@@ -56,7 +61,7 @@ class Stencil:
 
 def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
     """The stencils of a problem, written down once for all problems of the same structure."""
-    # The type belongs to the key: a user's part may call its structure what the library calls its own.
+    # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [type(constraint) for constraint in problem.constraints]
@@ -102,6 +107,7 @@ class _Writer:
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = self.start_time + fraction * duration, r + self.origin
+        # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
         resting, _ = split_effects(self.problem.effects, n)
         dldq, _, push = point_function(resting, self.dynamics.configuration, kinetic=False)(
             t, q, ca.DM.zeros(n), m
@@ -120,7 +126,7 @@ class _Writer:
         """Momenta of one step; cost and limits that look at its velocities or at a held control."""
         rule, problem, n = self.rule, self.problem, self.dynamics.positions
         draft, size = _Draft(self), self.dynamics.controls
-        # the j-th nodes of all steps; the nodes number steps times s, and one
+        # nodes[j] picks the j-th node of every step out of all steps * s + 1 nodes.
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
         r = [draft.take("position", n, at) for at in nodes]
         duration, costly = draft.duration(), self._cost_in_steps() or problem.actuator.burns
@@ -164,8 +170,8 @@ class _Writer:
     def _end_velocities(self, t0: Any, h: Any, r: list, m: list, push: list) -> tuple:
         """Velocities at the ends of a step from its momenta.
 
-        Its mean velocity does not see a held force that alternates from step to step, and a cost of
-        it alone lets the force do so.
+        The mean velocity of a step does not change with a held force that alternates from step to step, so a
+        cost of that velocity would let the force alternate.
         """
 
         def point(t, r, v, m):
@@ -262,7 +268,7 @@ class _Draft:
     def limit(self, name: str, kind: str, rows: Sequence[Row], owner: Owner | None = None) -> None:
         """Rows of this stencil alone."""
         if rows:
-            # The kernel holds the expressions.
+            # The expressions are in the kernel; the layout needs only names, bounds and units.
             bare = tuple(row._replace(expression=None) for row in rows)
             self._limits.append(Limit(name, kind, bare, owner))
             self.add(name, ca.vertcat(*[row.expression for row in rows]))

@@ -21,10 +21,11 @@ from dmoc.nlp.stencils import Stencils, stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
 
-# This many NLPs are held for problems of the same structure, mesh and units ...
+# At most this many NLPs are held, to serve again for problems of the same structure, mesh and units.
 MOST_HELD = 16
-# ... if they have no more nodes than this: then all of them together take less than 100 MB.
+# An NLP of more nodes than this is not held: 16 smaller ones together take less than 100 MB.
 MOST_HELD_NODES = 2000
+# The NLPs that are held in this process, by structure, mesh, units and kind of control.
 _NLPS = Shelf(MOST_HELD)
 
 
@@ -64,8 +65,8 @@ def transcribe(
 def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units, compiled: bool = False) -> NLP:
     """The NLP on the mesh, order and kind of control of a guess.
 
-    One of the last that were written down serves again for a problem of the same structure, on the same
-    mesh and in the same units.
+    An NLP that is held serves again for a problem of the same structure, on the same mesh and in the same
+    units.
     """
     stencils = stencils_of(problem, guess.order, guess.hold)
     mesh, sizes = (
@@ -76,7 +77,7 @@ def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units,
     key = (id(stencils), mesh, sizes, guess.hold, compiled)
 
     def make() -> tuple[Stencils, NLP]:
-        # The stencils are held with the NLP: the identity of an object that is gone may come again.
+        # The stencils are held with the NLP: once they were gone, another object might get their identity.
         return stencils, _transcribed(problem, stencils, guess, units, compiled, dynamics)
 
     small = len(guess.position) <= MOST_HELD_NODES

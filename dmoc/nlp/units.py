@@ -13,9 +13,9 @@ from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
 
-# The size of the objective is taken from this many nodes: more do not change its first digit.
+# The size of the objective is estimated from this many nodes: more do not change its first digit.
 SAMPLED = 400
-# A force used in a solution is taken as the unit down to this part of the limit.
+# The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
 
 
@@ -35,9 +35,9 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     """Canonical units of a problem near a path.
 
     Length: extent of the path, origin at its centre. Time: the duration. Force: the largest used
-    where a solution is known, else the limit, else what moves the mass that far in that time, or without
-    effects what turns it round.
-    Cost: what the objective is on the path, or would be with the unit of force all the way.
+    where a solution is known, else the limit, else the force that moves the mass over that length in that
+    time, or without effects the one that changes its velocities at the ends. Cost: the objective on the path,
+    or with the unit of force all the way if that is more.
     """
     low, high = guess.position.min(axis=0), guess.position.max(axis=0)
     time = guess.duration
@@ -45,7 +45,7 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     length = guess.diagonal or float(speed * time) or 1.0
     change = length / time
     if not problem.effects:
-        # nothing else turns the body round
+        # Without effects the actuator alone must change the velocities of both ends into the mean one.
         mean = (guess.position[-1] - guess.position[0]) / time
         turns = np.array([guess.start_velocity, guess.goal_velocity]) - mean
         change = max(change, float(np.linalg.norm(turns, axis=1).max()))

@@ -1,1 +1,1 @@
-"""What pushes, what is minimised, what is forbidden: parts that a problem is made of."""
+"""The parts that a problem is made of: actuators, objectives and constraints."""

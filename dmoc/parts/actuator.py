@@ -1,4 +1,4 @@
-"""The base of what pushes: how controls become a force, and which controls are allowed."""
+"""The base class of actuators: how controls become a force, and which controls are allowed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Actuator(ABC):
 
     1. Say how many controls a node has, what they are called and in which unit: `size`, `labels`, `units`.
     2. Make the force of them: `force`.
-    3. State the limits for the optimiser: plain `bounds`, and `rows` for those that are none.
+    3. State the limits for the optimiser: `bounds` of single controls, and `rows` for all other limits.
     4. Say by how much given controls break the limits: `excess`. The checks rest on it.
     5. Where it burns propellant or costs fuel: `throttle`, `flow`, `burns`, `metered`.
     6. Name its limit and how it gives way: `force_limit`, `times`, `eased`, `needs`, `violation`.
@@ -26,21 +26,40 @@ class Actuator(ABC):
 
     Not its business: meshes, units, where the body goes. Fields named in `adjustable` may change from one
     solve to the next without a rebuild; inside `force` and `rows` they may be symbols.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Lift(Actuator):
+    ...     limit: float
+    ...     def size(self, dimension):
+    ...         return 1
+    ...     def labels(self, dimension):
+    ...         return ("lift",)
+    ...     def force(self, u):
+    ...         return ca.vertcat(0, u)
+    ...     def bounds(self, dimension):
+    ...         return np.zeros(1), np.full(1, self.limit)
+    ...     def force_limit(self):
+    ...         return self.limit
+    ...     def words(self):
+    ...         return f"a force upwards of at most {self.limit:g} N"
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
     # The mass cannot fall below this [kg].
     dry_mass: float = 0.0
-    # A throttle that is tied to |F| rounds it at zero over this part of the largest thrust [-].
+    # A throttle among the controls equals |F|, rounded at zero over this part of the largest thrust [-];
+    # None for an actuator without such a throttle.
     smoothing: float | None = None
-    # Whether it coasts as a rule, so that pictures show when it is on.
+    # Whether it is off for parts of a usual transfer: pictures then shade the times when it is on.
     coasts: ClassVar[bool] = False
-    # What a picture calls the line at the force limit.
+    # Pictures label the line at the force limit with this.
     limit_label: ClassVar[str] = "limit"
 
     @property
     def structure(self) -> tuple:
-        """What cannot change in a re-solve: two actuators with the same structure have the same rows."""
+        """The type and all that is built into the rows: equal for actuators that one NLP can serve."""
         return (type(self),)
 
     @property
@@ -77,7 +96,7 @@ class Actuator(ABC):
         return []
 
     def throttle(self, u: Any) -> Any:
-        """Magnitude of the thrust that costs propellant [N]; None where the controls do not tell."""
+        """Magnitude of the thrust that costs propellant [N]; None where it is not among the controls."""
         return None
 
     def flow(self, u: Any) -> Any:
@@ -101,33 +120,33 @@ class Actuator(ABC):
         return np.maximum(0.0, np.maximum(lower - u, u - upper)).max(axis=1, initial=0.0)
 
     def times(self, factor: float) -> Actuator:
-        """The same actuator with limits so many times as large."""
+        """The same actuator with limits `factor` times as large."""
         return self
 
     def eased(self, slack: float) -> Actuator:
-        """The actuator with limits as large as rows and bounds need that lack `slack` of the limit."""
+        """The actuator whose limits are just enough where dimensionless rows are exceeded by `slack` [-]."""
         return self.times(1 + slack)
 
     def needs(self, eased: Actuator) -> str:
-        """The limit that is enough, in words, beside the one given."""
+        """In words, the limit of `eased`, which is enough, and the limit of this actuator, which was given."""
         enough = up(eased.force_limit() or 0.0)
         return f"a {self.limit_words} of {enough} N (you gave {self.force_limit():g} N)"
 
     @property
     def limit_words(self) -> str:
-        """What its limit is called."""
+        """The name of its limit in messages."""
         return "force limit"
 
     def unlimited(self) -> Actuator | None:
-        """The same controls without any limit, if these are a force; None for what is no free force."""
+        """A free force with the same controls; None where the controls are not the force itself."""
         return None
 
     def share(self, u: np.ndarray) -> float:
-        """How many times its limit the largest of some controls is, shape (count, size)."""
+        """The largest of the controls, shape (count, size), over its limit [-]."""
         return float(np.abs(u).max(initial=0.0)) / (self.force_limit() or np.inf)
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
-        """Size and unit of a row's violation for a person, from its size as the row states it."""
+        """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value * (self.force_limit() or 1.0), "N"
 
     def words(self) -> str:

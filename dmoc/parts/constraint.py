@@ -1,4 +1,4 @@
-"""The base of what is forbidden on the way."""
+"""The base class of constraints: limits that hold all along the way."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Constraint(ABC):
         """One line for a person: what the body does to keep it, as in "stays below 3 m"."""
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
-        """Size and unit of a row's violation for a person, from its size as the row states it."""
+        """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value, unit or "-"
 
     @property
@@ -90,15 +90,15 @@ class Constraint(ABC):
         return None
 
     def times(self, factor: float) -> Constraint:
-        """The same constraint with a limit on the speed so many times as large."""
+        """The same constraint with a limit on the speed `factor` times as large."""
         return self
 
     def eased(self, slack: float) -> Constraint | None:
-        """The constraint as loose as rows need that lack `slack`; None if it cannot be as loose as that."""
+        """The constraint just loose enough for rows exceeded by `slack`; None if no such constraint exists."""
         return self
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
-        """What would be enough, in words; `amount` says by how much the rows give way, with its unit."""
+        """In words, the limit that is enough; `amount` says by how much the rows give way, with its unit."""
         return f"constraint {index}, {type(self).__name__}, to give way by {amount}"
 
     def outline(self) -> tuple[Shape, ...]:
@@ -110,7 +110,7 @@ class Constraint(ABC):
         return np.inf
 
     def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-        """A path, shape (nodes, dimension) [m], moved off places where no way round it is the nearer one."""
+        """A path, shape (nodes, dimension) [m], moved off places from which all ways round are equally long."""
         return path
 
     def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -6,18 +6,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-# A path that passes the centre within this part of the radius is pushed aside.
+# A path that passes the centre within this part of the radius [-] is pushed aside: no side is clearly nearer.
 CENTRAL = 0.05
-# It is pushed by this part of the radius: enough for the optimiser to see which side is nearer.
+# A path is pushed aside by this part of the radius [-]: enough for the optimiser to see which side is nearer.
 PUSHED = 0.3
-# A detour passes the centre at this many radii.
+# A detour passes the centre at this many radii [-], so that half a radius is left between path and ball.
 CLEARANCE = 1.5
 
 
 def off_centre(path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
     """Push a path aside where it runs through the centre of a ball.
 
-    There no side is nearer than the other, and every step of the optimiser keeps to the middle.
+    At the centre both sides are equally near, and every step of the optimiser would keep to the middle.
     """
     if path.shape[1] == 1:
         return path
@@ -32,6 +32,7 @@ def off_centre(path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radi
         order = np.argsort(np.abs(along), kind="stable")
         aside = np.zeros_like(along)
         aside[order[0]], aside[order[-1]] = along[order[-1]], -along[order[0]]
+    # The push fades to zero two radii from the centre and at both ends, which must stay where they are.
     near = np.maximum(0.0, 1 - (distance / (2 * radius)) ** 2) ** 2 * 4 * fractions * (1 - fractions)
     push = PUSHED * radius * near / max(near[node], 1e-3)
     return path + push[:, None] * aside / np.linalg.norm(aside)
@@ -42,14 +43,17 @@ def ways_round(
 ) -> Iterator[tuple[str, np.ndarray]]:
     """Bends of a path, zero at its ends, that take it past a ball on either side of it."""
     node, along = _passing(path, int(np.argmin(np.linalg.norm(path - center, axis=1))))
+    # The axes without their parts along the path; an axis nearly along it would leave no direction across.
     across = np.eye(len(center)) - np.outer(along, along)
     sides = [side / np.linalg.norm(side) for side in across if np.linalg.norm(side) > 0.5]
+    # The bend rises from zero at the start to one at the node nearest to the centre, and falls to zero.
     peak = fractions[node]
     shape = np.where(fractions < peak, fractions / peak, (1 - fractions) / (1 - peak))
     shape = np.sin(0.5 * np.pi * shape)[:, None]
     gap = path[node] - center
     for i, direction in enumerate(sides):
         for sign in (1, -1):
+            # The path moves across its direction only: moves along it would change the speed, not the place.
             reach = sign * CLEARANCE * radius * direction - gap
             yield f"{'+' if sign > 0 else '-'}{i + 1} side", shape * (reach - along * (reach @ along))
 

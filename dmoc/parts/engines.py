@@ -1,4 +1,4 @@
-"""What pushes and burns: thrust with a magnitude of its own, and a mass that shrinks."""
+"""Actuators that burn propellant: thrust with a magnitude of its own, and a mass that shrinks."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from dmoc.basics.arguments import Vector, checked, entries, limits, number, shor
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
 
+# Standard gravity [m/s^2] turns a specific impulse [s] into an exhaust velocity [m/s]; exact by definition.
 STANDARD_GRAVITY = 9.80665
 
 
 class _Burner(Actuator):
-    """Shared by engines and nozzles: exhaust velocity, dry mass, mass flow."""
+    """The fields and methods that engines and nozzles share: exhaust velocity, dry mass, mass flow."""
 
     exhaust_velocity: float | None
     dry_mass: float
@@ -66,8 +67,8 @@ class Engine(_Burner):
     The controls of a node are the force and its magnitude, the throttle, tied together by
     sqrt(|F|^2 + eps^2) = throttle with eps = smoothing * max_thrust: at zero thrust |F| alone has no
     derivative. A coasting engine so burns eps / exhaust_velocity, which the default keeps at 1e-5 of
-    full flow. The set of forces is a ball, convex, as long as min_thrust is 0; with a throttle floor
-    it is a shell, not convex, and solutions are local optima in a stronger sense.
+    full flow. The set of forces is a ball, convex, as long as min_thrust is 0. With a throttle floor
+    it is a shell, not convex: another starting guess may then lead to another optimum.
 
     Parameters
     ----------
@@ -146,7 +147,8 @@ class Engine(_Burner):
     def excess(self, u: np.ndarray) -> np.ndarray:
         thrust = np.linalg.norm(u[:, :-1], axis=1)
         over = np.maximum(thrust - self.max_thrust, self.min_thrust - u[:, -1])
-        # what the throttle does not pay for, beyond what the rounding of |F| makes
+        # Propellant is burnt by the throttle, so the throttle must equal the force, rounded at zero as in
+        # `rows`.
         unpaid = np.abs(np.hypot(thrust, self.smoothing * self.max_thrust) - u[:, -1])
         return np.maximum(0.0, np.maximum(over, unpaid))
 

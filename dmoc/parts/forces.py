@@ -47,6 +47,7 @@ class BoxForce(Actuator):
         return -limit, limit
 
     def metered(self, dimension: int) -> Actuator:
+        # No force in the box is larger than its diagonal, so the limit on the magnitude never acts by itself.
         limits = np.broadcast_to(np.asarray(self.limit, float), (dimension,))
         return Engine(float(np.linalg.norm(limits)), box=self.limit)
 
@@ -108,7 +109,7 @@ class BallForce(Actuator):
         return BallForce(factor * self.limit)
 
     def eased(self, slack: float) -> BallForce:
-        # The row is the square of the share of the limit.
+        # The row is |F|^2 / limit^2 <= 1 + slack, so the limit on |F| grows by the root.
         return self.times(float(np.sqrt(1 + slack)))
 
     def unlimited(self) -> Actuator:

@@ -1,4 +1,4 @@
-"""What is minimised or maximised."""
+"""Objectives: the quantity that a transfer minimises or maximises."""
 
 from __future__ import annotations
 
@@ -17,9 +17,25 @@ from dmoc.parts.actuator import Actuator
 class Objective(ABC):
     """The integral of `running` over time plus `terminal` at the goal.
 
-    A user's own objective overrides either. `u` are the controls, for a force actuator the force [N].
-    Objectives add up: `0.5 * Effort() + 2 * Time()`; one that is maximised is taken away from one
-    that is minimised: `Effort() - 3 * FinalMass()`.
+    A frozen dataclass that derives from this has these duties:
+
+    1. State its value as CasADi expressions, with its own sign: `running`, per second at an instant of the
+       path, `terminal`, of the state at the goal, or both.
+    2. Name the `unit` of that value, and set `sense` to -1 if it is maximised.
+
+    What follows has a default that suits most objectives:
+
+    3. `rate` in place of `running`, and `unit_with` in place of `unit`, where the value depends on the force
+       or the mass flow that an actuator makes of its controls.
+    4. `metered`, where it needs the magnitude of the force among the controls.
+    5. `check_dimension`: refuse a problem in whose number of axes it has no meaning.
+    6. `words`, by default the first line of its docstring, and `label`, by default the name of its class.
+
+    Not its business: the integration over time, meshes, units, scaling, limits, and the sign by which a
+    maximum becomes a minimum. `u` are the controls, for a force actuator the force [N].
+
+    Objectives add up: `0.5 * Effort() + 2 * Time()`; one that is maximised is subtracted from one that is
+    minimised: `Effort() - 3 * FinalMass()`.
 
     Attributes
     ----------
@@ -29,6 +45,16 @@ class Objective(ABC):
         way; multipliers are those of the minimisation of `sense` times the objective.
     metered : bool
         Whether it needs the magnitude of the force among the controls.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Closeness(Objective):
+    ...     unit = "m^2 s"
+    ...     def running(self, t, q, v, u, m):
+    ...         return ca.dot(q, q)
+    ...     def words(self):
+    ...         return "Least integral of the squared distance from the origin"
     """
 
     unit: ClassVar[str] = ""
@@ -38,7 +64,7 @@ class Objective(ABC):
 
     @property
     def terms(self) -> tuple[tuple[float, Objective], ...]:
-        """The objectives this one is the sum of, each with its weight."""
+        """Pairs (weight, objective) whose sum this objective is."""
         return ((1.0, self),)
 
     def __mul__(self, weight: float) -> WeightedSum:
@@ -68,7 +94,7 @@ class Objective(ABC):
         return 0
 
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
-        """Cost per second where it depends on what the actuator makes of its controls."""
+        """Cost per second with this actuator: `running`, unless the cost looks at its force or mass flow."""
         return self.running(t, q, v, u, m)
 
     def unit_with(self, actuator: Actuator) -> str:
@@ -77,7 +103,7 @@ class Objective(ABC):
 
     @property
     def label(self) -> str:
-        """What it is, such as `final mass`."""
+        """Its name for a person, such as `final mass`."""
         return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(self).__name__).lower()
 
     def words(self) -> str:
@@ -192,8 +218,8 @@ class WeightedSum(Objective):
     Parameters
     ----------
     parts : tuple of (float, Objective)
-        Weights and objectives. All must pull the same way: what is maximised needs the opposite sign
-        of what is minimised.
+        Weights and objectives. A maximised objective must have a weight of the opposite sign to that of a
+        minimised one.
     """
 
     parts: Sequence[tuple[float, Objective]]
@@ -238,6 +264,7 @@ class WeightedSum(Objective):
             term.check_dimension(dimension)
 
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        # A term of weight 0 is left out: 0 times a value that is not finite would not be 0.
         return sum(weight * term.rate(actuator, t, q, v, u, m) for weight, term in self.parts if weight)
 
     def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:

@@ -32,4 +32,5 @@ class Cone:
     half_angle: float
 
 
+# A constraint can answer `outline` with these shapes, which pictures know how to draw.
 Shape = Ball | Box | Cone

@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Row(NamedTuple):
-    """lower <= expression <= upper, of order 1 and dimensionless; or in `unit`, "m" or "m/s"."""
+    """lower <= expression <= upper: dimensionless and of a size near 1, or in `unit`, "m" or "m/s"."""
 
     name: str
     expression: Any
@@ -34,6 +34,7 @@ def with_symbols(part: Any, name: str) -> tuple[Any, list]:
     """A twin of a part whose adjustable fields are CasADi symbols, and those symbols."""
     twin, symbols = copy.copy(part), []
     for field, value in zip(part.adjustable, _values(part), strict=True):
+        # The twin is frozen, and its constructor would refuse a symbol: the field is set past both.
         symbol = ca.SX.sym(f"{name}.{field}", value.size)
         object.__setattr__(twin, field, symbol)
         symbols.append(symbol)

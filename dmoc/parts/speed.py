@@ -50,6 +50,7 @@ class SpeedLimit(Constraint):
         return replace(self, limit=factor * self.limit)
 
     def eased(self, slack: float) -> SpeedLimit:
+        # The row is |v|^2 / limit^2 <= 1 + slack, so the limit on |v| grows by the root.
         return self.times(float(np.sqrt(1 + slack)))
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:

@@ -1,4 +1,4 @@
-"""Where the body must not be, or must stay."""
+"""Constraints on the position: zones to stay out of, and zones to stay in."""
 
 from __future__ import annotations
 
@@ -57,6 +57,8 @@ class KeepOut(Constraint):
         return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
 
     def eased(self, slack: float) -> KeepOut | None:
+        # The row is |d|^2 / radius^2 >= 1 - slack, so the radius shrinks by the root; from 1 on nothing is
+        # left.
         return replace(self, radius=self.radius * float(np.sqrt(1 - slack))) if slack < 1 else None
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
@@ -94,6 +96,7 @@ class KeepIn(Constraint):
             value = getattr(self, name)
             given = entries(value)
             given = (value,) if given is None else given
+            # `vector` refuses infinite numbers: they pass it as 0 m and are put back afterwards.
             endless = {
                 i for i, x in enumerate(given) if isinstance(x, (float, np.floating)) and abs(x) == np.inf
             }
@@ -178,6 +181,7 @@ class ApproachCone(Constraint):
             side = cos * ca.det(ca.horzcat(ca.vertcat(self.axis[0], self.axis[1]), offset))
             lines = {"left": sin * depth - side, "right": sin * depth + side}
             return [Row(name, inward, 0.0, np.inf, "m") for name, inward in lines.items()]
+        # The rounding is taken off again, so that the tip itself, with a distance of 0 m, is allowed.
         distance = ca.sqrt(ca.dot(offset, offset) + self.rounding**2) - self.rounding
         return [Row("cone", depth - cos * distance, 0.0, np.inf, "m")]
 
@@ -185,6 +189,7 @@ class ApproachCone(Constraint):
         offset = q - np.asarray(self.apex)
         depth = offset @ np.asarray(self.axis)
         aside = np.linalg.norm(offset - depth[:, None] * np.asarray(self.axis), axis=1)
+        # The distance from the surface is |d| sin(angle beyond it); behind the tip it is |d| itself.
         beyond = np.arctan2(aside, depth) - self.half_angle
         return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
 

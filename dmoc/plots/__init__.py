@@ -1,1 +1,1 @@
-"""Pictures."""
+"""Pictures of solutions, sweeps and studies."""

@@ -1,4 +1,4 @@
-"""Time against expense over all points of a sweep, and what every panel of its figure shares."""
+"""Time against expense over all points of a sweep, and helpers for every panel of its figure."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from dmoc.sweeps.plan import ordered
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
+# Powers in a unit are written with these raised digits.
 SUPERSCRIPTS = {"^2": "\u00b2", "^3": "\u00b3"}
-# A wider range than this is drawn on a logarithmic scale.
+# Values whose largest is more than this many times the smallest are drawn on a logarithmic scale: on a linear
+# one the small ones would all lie at the bottom.
 WIDE_SPAN = 30.0
+# The front is drawn in this style, in a panel of its own or on the curve of the objective.
 FRONT: dict[str, Any] = {
     "color": PUSH,
     "marker": "o",
@@ -58,7 +61,7 @@ def pareto(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def front_axes(data: Dataset) -> tuple[str, str] | None:
-    """What stands for time and for expense, or None where there is no choice between them."""
+    """The names of the results for time and for expense, or None where all points take the same time."""
     known = result(data, "checks_hold").values
     durations, burned = (result(data, name).values[known] for name in ("duration", "propellant"))
     if durations.size < 3 or np.ptp(durations) < 1e-6 * durations.max():
@@ -74,7 +77,7 @@ def is_front_itself(data: Dataset, names: tuple[str, str]) -> bool:
 
 
 def coordinate(data: Dataset, name: Any) -> tuple[np.ndarray, str]:
-    """Where the values of a parameter stand on an axis, and what is written there."""
+    """The places of a parameter's values on an axis, and the label of the axis."""
     values, unit = data[name].values, unit_of(data[name])
     if not ordered(values):
         return np.arange(float(len(values))), str(name)
@@ -84,7 +87,7 @@ def coordinate(data: Dataset, name: Any) -> tuple[np.ndarray, str]:
 
 
 def along(axis: Any, data: Dataset, name: Any) -> np.ndarray:
-    """Write on an axis what stands along it; where the values of the parameter stand."""
+    """Label an axis with a parameter; the places of the parameter's values on it."""
     places, label = coordinate(data, name)
     axis.set_label_text(label)
     if not ordered(data[name].values):

@@ -1,4 +1,4 @@
-"""The ledger panel: energy gained and work done, or momentum gained and where it came from."""
+"""The ledger panel: energy gained and work done, or momentum gained and the impulses behind it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from dmoc.motion.momenta import legendre_momenta
 from dmoc.plots.style import AXIS_COLOURS, DARK, PATH, PUSH, readable
 from dmoc.results.solution import Solution
 
+# The gain of the body is a broad pale line, so that the thin line of the works or impulses is seen upon it.
 GAINED: dict[str, Any] = {"linewidth": 6, "alpha": 0.35}
 
 
 def draw_ledger(axes: Any, solution: Solution, late: float) -> None:
-    """Energy where it is kept, else momentum: what the body gained, and what it was given."""
+    """Energy where it is kept, else momentum: the gain of the body, and the works or impulses upon it."""
     (_draw_energy if _keeps_energy(solution) else _draw_momentum)(axes, solution, late)
 
 
@@ -105,7 +106,7 @@ def _step_velocities(solution: Solution) -> np.ndarray:
 
 
 def _draw_momentum(axes: Any, solution: Solution, late: float) -> None:
-    """What each axis gained, the impulse of the force, and with the problem at hand that of all together."""
+    """The gain along each axis, the impulse of the force, and that of force and effects if these are known."""
     rule, mass = scheme(solution.order), solution.path.mass
     pushes = _node_forces(solution) / mass[step_nodes(solution.steps, rule)][:, :, None]
     h = np.diff(solution.end_times)[:, None]

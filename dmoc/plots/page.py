@@ -32,10 +32,14 @@ if TYPE_CHECKING:
 
     from dmoc.checks.verification import Report
 
+# A figure can be written in these formats, which the end of the file's name decides.
 SUFFIXES = (".png", ".pdf", ".svg")
+# Units in the headline have this sign for a square.
 SQUARED = "\u00b2"
-# A limit so many times the largest force would flatten the curves: its number stands in the legend.
+# A limit of more than this many times the largest force is told in the legend alone: its line would flatten the
+# curves.
 FAR = 6.0
+# Limits are drawn in this style, dashed and behind the curves.
 LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
@@ -83,7 +87,7 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
 
     with matplotlib.rc_context(SETTINGS):
         page = Figure(figsize=(13.33, 7.5))
-        # the layout does not see the label of the z axis
+        # The layout does not see the label of the z axis in space, so the columns are kept further apart.
         page.set_layout_engine(
             "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
         )
@@ -179,14 +183,14 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
         if (limit := constraint.largest_speed()) is not None:
             axes.axhline(limit / size, label="limit", **LIMIT)
     if np.nanmin(speed) < 0.5 * np.nanmax(speed):
-        # above that the changes are what there is to see
+        # A speed that never falls by half is drawn without the zero, so that its small changes can be seen.
         axes.set_ylim(bottom=0)
     axes.set_ylabel(f"speed [{unit}]")
     axes.set_title("Speed")
 
 
 def _headline(solution: Solution, late: float, late_unit: str) -> str:
-    """What was found, with times in the unit of the time axis."""
+    """The objective, duration and final mass, with times in the unit of the time axis."""
     about, problem = solution.provenance, solution.problem
     name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
     if not solution.optimal:

@@ -1,4 +1,4 @@
-"""The path panel: where the body goes, what pulls it, where it must not be, and where it is pushed."""
+"""The path panel: the path, the scene around it, and the force along it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from dmoc.plots.scene import Corners, draw_scene, outlines, view_of
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
 from dmoc.results.solution import Solution
 
+# Step ends are drawn as dots if there are at most this many steps: more would hide the line.
 MOST_DOTS = 40
+# At most this many arrows show the force along the path: more would stand on one another.
 ARROWS = 20
-# Length of the longest force arrow, as a part of the extent.
+# The longest arrow of the force is this part of the extent [-].
 ARROW = 0.12
-# From this width on, over the height, a plane path gets a panel over the whole page.
+# A plane path whose width is more than this many times its height gets a panel over the whole page.
 WIDE = 2.5
 
 
@@ -41,7 +43,7 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
     if solution.dimension == 3:
         floor = np.full(len(path), view[0][2])
         axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label="its shadow", zorder=0)
-        # drawn by the order given, else the path would hide behind what it passes in front of
+        # The order is given, since matplotlib would hide the path behind surfaces that it passes in front of.
         axes.computed_zorder = False
     _frame(axes, view, unit)
     _legend(axes, proxies, beside)
@@ -61,6 +63,7 @@ def _view(solution: Solution) -> Corners:
 def burning(solution: Solution) -> np.ndarray | None:
     """Where an engine that also coasts is on: a value a node, or a step if held; None for what never coasts."""
     strength = np.linalg.norm(solution.force, axis=1)
+    # The rounding of |F| at zero leaves a little thrust while coasting, far below a fiftieth.
     on = strength > 0.02 * strength.max(initial=0.0)
     switches = solution.problem is not None and solution.problem.actuator.coasts
     return on if switches and on.any() and not on.all() else None
@@ -107,7 +110,7 @@ def _arrows(solution: Solution) -> tuple[np.ndarray, np.ndarray, float]:
         ends = places[:: solution.order // 2]
         places = 0.5 * (ends[1:] + ends[:-1])
     if (on := burning(solution)) is not None:
-        # coasting has nothing to show, and a burn may be short
+        # All arrows stand in burns: a coast has none, and a short burn might have got none.
         places, force = places[on], force[on]
     few = np.unique(np.linspace(0, len(force) - 1, ARROWS).round().astype(int))
     places, force = places[few], force[few]
@@ -147,7 +150,7 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
     axes.set(**{f"{name}label": f"{name} [{unit}]" for name in names})
     axes.set_title("Path", loc="left")
     if len(names) == 2:
-        # limits that are not fixed let the equal scales fill the panel
+        # With limits that are not fixed, axes of equal scale fill the whole panel.
         axes.dataLim.set_points(np.array(view))
         axes.set(xmargin=0, ymargin=0)
         axes.set_aspect("equal", adjustable="datalim")

@@ -1,4 +1,4 @@
-"""The surroundings of a path: what pulls, what is forbidden, and how much of it is in view."""
+"""The surroundings of a path: attractors, zones, and how much of them is in view."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from dmoc.parts.outline import Ball, Box, Cone, Shape
 from dmoc.plots.style import ATTRACTOR, DARK, FORBIDDEN
 from dmoc.results.solution import Solution
 
-# How far beyond the path zones are shown, as a part of the extent.
+# Zones and attractors are shown up to this part of the extent beyond the path [-].
 REACH = 0.5
-# A region without a shape of its own is looked at on a grid of this many places along each axis.
+# A forbidden region without a shape of its own is found on a grid of this many places along each axis.
 REGION_POINTS = 600
 
+# The lower and the upper corner of a view or a box, in metres or in the unit of the drawing.
 Corners = tuple[np.ndarray, np.ndarray]
 
 
 def view_of(solution: Solution, drawn: np.ndarray) -> Corners:
-    """Corners [m] of what is shown: points of the path and its arrows, and the scene near them."""
-    # the last iterate of a failed solve may hold anything
+    """Corners [m] of the view: points of the path and its arrows, and the scene near them."""
+    # The last iterate of a failed solve may hold numbers that are not finite.
     drawn = drawn[np.isfinite(drawn).all(axis=1)]
     low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else np.zeros((2, solution.dimension))
     extent = float((high - low).max()) or 1.0
     near, far = low - REACH * extent, high + REACH * extent
     for shape in outlines(solution):
         if isinstance(shape, Box):
-            # Walls far away would make the path a dot, and what lies behind near ones does not matter.
+            # Walls far away would make the path a dot, and nothing behind near walls matters.
             walls = [shape.lower, shape.upper]
             low, high = (
                 np.where((w > near) & (w < far), w, end) for w, end in zip(walls, (low, high), strict=True)
@@ -66,7 +67,7 @@ def _attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
 
 
 def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> list[Any]:
-    """Draw what is forbidden and what attracts; further entries for the legend."""
+    """Draw zones and attractors; further entries for the legend."""
     from matplotlib.patches import Patch
 
     proxies = []
@@ -95,7 +96,7 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
 
 
 def outlines(solution: Solution) -> list[Shape]:
-    """Shapes of all that is forbidden, as the constraints tell them."""
+    """The shapes of all constraints, as they tell them."""
     constraints = solution.problem.constraints if solution.problem else ()
     return [shape for constraint in constraints for shape in constraint.outline()]
 
@@ -136,11 +137,11 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
         disc.set_gid(name)
         axes.add_patch(disc)
         return
-    # the poles are left out: a triangle without area has no shade
+    # The poles are left out: a triangle without area has no shade.
     around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 31), np.linspace(1e-3, np.pi - 1e-3, 16))
     unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
     surface = center[:, None, None] + radius * unit
-    # axes in space do not clip
+    # Matplotlib does not clip surfaces in space.
     inside = np.all([(s >= a) & (s <= b) for s, a, b in zip(surface, *view, strict=True)], axis=0)
     surface = np.where(inside, surface, np.nan)
     light = LightSource(azdeg=225, altdeg=50)
@@ -152,7 +153,7 @@ def _cone(solution: Solution, cone: Cone) -> np.ndarray:
     """Points of a cone from the tip to as deep as the path goes [m], shape (axes, depths, around)."""
     axis, apex = cone.axis, cone.apex
     depth = float(np.nanmax((solution.position - apex) @ axis, initial=0.0))
-    # directions across the axis: two in space, in the plane one and back
+    # In the plane the three angles lead to one side of the axis, to the other and back; in space they go round.
     across = np.linalg.svd(axis[None])[2][1:]
     around = np.linspace(0, 2 * np.pi, 3 if len(axis) == 2 else 37)
     circle = np.stack([np.cos(around), np.sin(around)])[: len(across)].T @ across

@@ -15,9 +15,11 @@ from dmoc.studies.rounding import FORMS, Amplification, RoundOff
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Other methods are black, grey and pink, apart from the colours of the orders.
 OTHERS = {"RK4": "#222222", "DOP853": "#808080", "DOP853, adaptive": "#CC79A7"}
+# The relative rounding error of one addition [-] sets the height of the line of a random walk.
 EPS = float(np.finfo(float).eps)
-# Amplification a step up to which the edges of stability are drawn.
+# The edges of stability are drawn up to this amplification a step [-].
 HIGHEST = 1.6
 
 
@@ -61,7 +63,7 @@ def _style(method: str) -> dict[str, Any]:
 
 
 def _draw_history(axes: Any, rows: Sequence[Drift], which: int, title: str) -> None:
-    """The middle mesh of every method, but not of the one that chooses its steps."""
+    """An error over the revolutions, for the middle mesh of every method."""
     for method in dict.fromkeys(row.method for row in rows):
         meshes = [row for row in rows if row.method == method]
         row = meshes[len(meshes) // 2]
@@ -87,8 +89,9 @@ def _draw_rounding(axes: Any, rounding: Sequence[RoundOff]) -> None:
     for row, colour in zip(rounding, (WARNING, COLOURS["order 2"], COLOURS["order 6"]), strict=True):
         words = r"$x_{k+1} = 2x_k - x_{k-1} + h^2 a_k$" if row.form == FORMS[0] else row.form
         axes.loglog(steps, row.momentum_error, color=colour, linewidth=2.2, label=words)
+    # Independent rounding errors add up like a random walk, by the root of their number.
     axes.loglog(steps, EPS * np.sqrt(steps), color=PALE, linestyle=":", linewidth=1.4, label="random walk")
-    # room for the legend
+    # The curves leave room for the legend above them.
     axes.set_ylim(top=200 * rounding[0].momentum_error[-1])
     axes.legend(loc="upper left", fontsize=10)
     axes.set_title("Rounding alone: angular momentum error")

@@ -17,12 +17,15 @@ from dmoc.studies.accuracy import COLD, COMPILED, Trial
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette for the orders; what they are measured against is grey and dashed.
+# The orders have colours of Okabe and Ito's palette, which stay apart under colour blindness.
 COLOURS = {"order 2": "#E69F00", "order 4": "#009E73", "order 6": "#0072B2", "order 8": "#D55E00"}
+# Other methods have these greys in turn, so that the orders stand out.
 GREYS = ("#4D4D4D", "#808080", "#666666", "#8C8C8C", "#595959", "#737373")
+# Other methods have these markers in turn, none of them the circle of the orders.
 MARKERS = "sD^vPX*<>h"
+# Other methods have these dashes in turn.
 DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (7, 2, 1, 2)), (0, (3, 1.5)), (0, (5, 1.5, 1, 1.5, 1, 1.5)))
-# Least distance between two labels, a share of the height of the panel.
+# Two labels are at least this part of the panel's height apart [-], so that they do not overlap.
 APART = 0.045
 
 
@@ -36,7 +39,7 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
     path : path
         Ends in .png, .pdf or .svg, which decides the format.
     title : str
-        What was solved.
+        Title of the figure: the problem that was solved.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple
 
 
 def plain_numbers(axis: Any) -> None:
-    """20 rather than 2 times ten to the first; at 1, 2 and 5 of every decade if there is room."""
+    """Numbers such as 20 on a logarithmic axis, at 1, 2 and 5 of every decade if there is room, else at 1."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_data_interval()

@@ -1,4 +1,4 @@
-"""What all panels of a figure share: colours, units that read well, curves between the nodes."""
+"""Helpers that all panels of a figure share: colours, units that read well, curves between the nodes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,28 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.results.solution import Solution
 
-# Okabe and Ito's palette, which stays apart under the common kinds of colour blindness.
+# Colours are those of Okabe and Ito's palette, which stay apart under the common kinds of colour blindness.
+# The curves of x, y and z have these colours.
 AXIS_COLOURS = ("#0072B2", "#D55E00", "#009E73")
+# The curves of x, y and z have these lines, which stay apart without colour, too.
 AXIS_LINES = ("-", (0, (5, 2)), (0, (4, 1.5, 1, 1.5)))
-DARK, PALE = "#222222", "#808080"
-PATH, PUSH, FORBIDDEN, ATTRACTOR = "#0072B2", "#E69F00", "#CC79A7", "#F0E442"
+# Texts, edges and magnitudes are of this dark grey.
+DARK = "#222222"
+# Lines in the background, such as limits, are of this pale grey.
+PALE = "#808080"
+# The path and its speed are blue.
+PATH = "#0072B2"
+# The force and the times when an engine is on are orange.
+PUSH = "#E69F00"
+# Zones that are forbidden, and the walls of those to stay in, are pink.
+FORBIDDEN = "#CC79A7"
+# Attractors are yellow.
+ATTRACTOR = "#F0E442"
+# Words and marks of a failure are of this dark red.
 WARNING = "#B03A00"
 
+# All figures have these settings of matplotlib: letters large enough for a page on a screen, few lines around
+# it.
 SETTINGS: Any = {
     "text.usetex": False,
     "font.family": "sans-serif",
@@ -37,7 +52,8 @@ SETTINGS: Any = {
     "axes.formatter.limits": (-3, 5),
 }
 
-# Other units in which a number reads better: the least value drawn in them and their size, largest first.
+# Values given in an SI unit are drawn in another one from this least value on: (least value, size of that unit,
+# its name), the largest first.
 _UNITS = {
     "s": ((3 * 86400.0, 86400.0, "days"), (3 * 3600.0, 3600.0, "h")),
     "m": ((1e4, 1e3, "km"),),

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import DataArray, Dataset
 
+# A map has this many contour lines.
 LEVELS = 8
-# Cells each way from which contours bear numbers: on fewer these stand on one another.
+# Contours bear numbers on maps of at least this many cells each way: on fewer the numbers stand on one another.
 LABELLED = 12
 
 
@@ -50,9 +51,10 @@ def save_sweep(data: Dataset, path: str | os.PathLike) -> None:
 def sweep_figure(data: Dataset) -> Figure:
     """A matplotlib Figure of a sweep.
 
-    One parameter: a curve. Two: a map with contours, what failed hatched. More: the best over the
-    further dimensions. A sample: a cloud. Beside it, where durations differ, every point by its
-    duration and its expense, and the front of those that no other beats in both.
+    A sweep of one parameter is a curve. Two parameters are a map with contours, where failed points are
+    hatched; more are a map of the best over the further dimensions. A sample is a cloud. Where durations
+    differ, a second panel has every point by its duration and its expense, and the front of those that no
+    other beats in both.
     """
     import matplotlib
     from matplotlib.figure import Figure
@@ -60,7 +62,7 @@ def sweep_figure(data: Dataset) -> Figure:
     objective = result(data, "objective")
     sampled = objective.dims[0] not in data.indexes
     if sampled and len(data.coords) == 1:
-        # a sample of one parameter is a curve like any other
+        # A sample of one parameter is drawn as a curve, in the order of its values.
         name = next(iter(data.coords))
         data, sampled = data.swap_dims({objective.dims[0]: name}).sortby(name), False
         objective = result(data, "objective")
@@ -84,7 +86,7 @@ def sweep_figure(data: Dataset) -> Figure:
 
 
 def _draw_curve(axes: Any, data: Dataset, front: bool) -> None:
-    """The objective over the only parameter; what failed is marked on the axis."""
+    """The objective over the only parameter; points that failed are marked on the axis."""
     objective, solved = result(data, "objective"), result(data, "success").values
     place = along(axes.xaxis, data, objective.dims[0])
     size, unit = readable(objective.values, unit_of(objective))
@@ -221,7 +223,7 @@ def _sweep_headline(data: Dataset) -> str:
 
 
 def _sweep_footnote(data: Dataset) -> tuple[str, bool]:
-    """How many points there are and what became of them, and whether all is well."""
+    """Numbers of points solved and failed in words, and whether all is well."""
     success, held = result(data, "success").values, result(data, "checks_hold").values
     solved, broken = int(success.sum()), int((success & ~held).sum())
     words = f"{success.size} points, {solved} solved"

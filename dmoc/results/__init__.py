@@ -1,1 +1,1 @@
-"""What a solve found, kept."""
+"""Results: a solution, the facts about it, and its file."""

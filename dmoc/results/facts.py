@@ -1,4 +1,4 @@
-"""What is known of a solution beside its numbers: the ladder, the errors, where it comes from."""
+"""Facts about a solution besides its path: the ladder, the errors, its provenance."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Error:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a solution comes from: what is to be known of it even where its problem is not at hand.
+    """Where a solution comes from: the facts that a file of it holds in place of its problem.
 
     Attributes
     ----------
     problem_name : str
     parameters : dict
-        What the problem was made with.
+        Values of the parameters from which the problem was made.
     start_time : float
         Time at the start [s].
     objective_unit : str
@@ -77,7 +77,7 @@ class Provenance:
 
     @classmethod
     def of(cls, problem: TransferProblem, options: dict[str, Any] | None = None) -> Provenance:
-        """What there is to be known of a problem and of the options of its solver."""
+        """The provenance of a solution of this problem with these options of the solver."""
         return cls(
             problem.name,
             problem.parameters,

@@ -17,15 +17,16 @@ import numpy as np
 
 from dmoc.basics.files import AGAIN, as_path, is_sealed, sealed, whole_file
 
+# An HDF5 file, and so a netCDF-4 file, begins with these bytes.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
-# (dimensions, values, attributes) of every variable by name
+# A table holds (dimensions, values, attributes) of every variable by name.
 Table = dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file: its name and version, what to call one, and who writes it."""
+    """A kind of file: its name and version, its description, and a sentence on the program that writes it."""
 
     name: str
     version: int
@@ -83,7 +84,7 @@ def format_of(path: str | os.PathLike) -> str | None:
 
 
 def one_line(error: Exception) -> str:
-    """What an error says, short enough to be read in a terminal."""
+    """The message of an error on one line, short enough for a terminal."""
     text = " ".join(str(error).split())
     return text if len(text) <= 160 else text[:157] + "..."
 
@@ -96,6 +97,7 @@ def _refuse_what_is_no_netcdf(file: Path, form: Format) -> None:
             head = stream.read(len(HDF5_SIGNATURE))
     except OSError as error:
         raise ValueError(f"{file} cannot be read: {error.strerror}") from None
+    # A beginning of the signature is a file that was cut short; anything else was never one.
     if len(head) < len(HDF5_SIGNATURE) and HDF5_SIGNATURE.startswith(head):
         raise ValueError(f"{file} is cut short: it holds {len(head)} bytes; {AGAIN}")
     if head != HDF5_SIGNATURE:

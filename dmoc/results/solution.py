@@ -1,4 +1,4 @@
-"""Solution: what a solve found, in SI units, with what it took; saved to and loaded from netCDF."""
+"""Solution: the answer of a solve in SI units, with its meshes and times; saved to and loaded from netCDF."""
 
 from __future__ import annotations
 
@@ -43,13 +43,14 @@ class Solution:
     success : bool
         Whether what was asked for was found: a local optimum, to the tolerance if one was given.
     status, message : str
-        What the solver said, and what to try if it failed.
+        The outcome of the solve, and what to try if it failed.
     ladder : tuple of Level
         The meshes on the way, coarse to fine.
     worst : tuple of (str, float, str)
         The worst violated rows and bounds of a failed solve, worst first: name, size and unit.
     tolerance, error, reason
-        What accuracy was asked for, the estimated errors, and why this mesh; empty without a tolerance.
+        The accuracy that was asked for, the estimated errors, and the reason for this mesh; empty without a
+        tolerance.
     provenance : Provenance
     """
 
@@ -198,7 +199,7 @@ class Solution:
         path : path
             Where to; an existing file is replaced.
         provenance
-            What only the caller knows, by the names of `Provenance` (`source_hash`, `parameters`,
+            Facts that only the caller knows, by the names of `Provenance` (`source_hash`, `parameters`,
             `problem_name`, ...).
 
         Raises

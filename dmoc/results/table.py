@@ -1,11 +1,11 @@
 """Result files: a Solution as netCDF-4, with units, and back again to the last bit.
 
-xarray opens them and has a view of a Solution, but is not needed to write or read one: with pandas,
-which it brings along, it takes longer to load than a solution to be checked.
+xarray opens them and has a view of a Solution, but is not needed to write or read one: importing it, with
+pandas, takes longer than the check of a solution.
 
 Dimensions: node, end (of a step), step, axis, channel (one a control). Every multiplier group is a
 variable of its own, `multiplier_<side>_<name>`, whose attribute `key` is its name in
-`DiscretePath.multipliers`. What is not an array is an attribute; what is neither number nor text is JSON.
+`DiscretePath.multipliers`. All else are attributes: numbers and texts as they are, other values as JSON.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import Format, Table, one_line, read_table, write_table
 
+# The name and version by which a file of this kind is known, its description, and the remedy where it is none.
 SOLUTION_FILE = Format(
     "dmoc solution", 2, "a result of dmoc", "results are written by Solution.save and by dmoc solve"
 )
 
-# SI unit of the unknown or row behind each multiplier, by the last part of its name; other rows have none.
+# A multiplier belongs to an unknown or row of this SI unit, by the last part of its name; other rows have none.
 DUAL_UNITS = {
     "dynamics": "m/s",
     "position": "m",
@@ -150,8 +151,9 @@ def _array(table: Table, name: str) -> np.ndarray:
 
 
 def _attributes(solution: Any) -> dict[str, Any]:
-    """What a reader of the file looks for first as attributes of their own, the rest as JSON."""
+    """Attributes of the file: facts that a reader looks for first each by itself, the rest as JSON."""
     about = solution.provenance
+    # A solution that was loaded and is saved again keeps the time and the versions of its solve.
     if not about.created:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         about = replace(about, created=now, versions=_versions() | about.versions)
@@ -196,7 +198,7 @@ def _versions() -> dict[str, str]:
 
 
 def _text(value: Any) -> str:
-    """JSON; arrays become lists and what JSON has no word for its Python text."""
+    """A value as JSON: arrays become lists, and values that JSON cannot hold become their Python text."""
 
     def plain(other: Any) -> Any:
         return other.tolist() if isinstance(other, (np.ndarray, np.generic)) else repr(other)
@@ -208,6 +210,7 @@ def _multipliers(solution: Any) -> Table:
     variables: Table = {}
     for key, values in solution.path.multipliers.items():
         name = re.sub(r"\W+", "_", f"multiplier_{key.side}_{key.group}")
+        # Two groups may have one name once it holds only letters and digits; `key` tells them apart.
         while name in variables:
             name += "_"
         unit = DUAL_UNITS.get(key.group.split(".")[-1] if key.side == "column" or key == COSTATE else "")
@@ -219,7 +222,7 @@ def _multipliers(solution: Any) -> Table:
 
 
 def _dimensions(solution: Any, kind: str, shape: tuple[int, int]) -> tuple[str, str]:
-    """Names of a multiplier group's two dimensions: those of the path where they are the same thing."""
+    """Names of a multiplier group's two dimensions: those of the path where they count the same."""
     kind = {"smooth": "node", "control": "step" if solution.hold else "node"}.get(kind, kind)
     sizes = {"node": len(solution.path.position), "step": solution.steps}
     first = kind if sizes.get(kind) == shape[0] else f"count_{shape[0]}"
@@ -227,7 +230,7 @@ def _dimensions(solution: Any, kind: str, shape: tuple[int, int]) -> tuple[str, 
 
 
 def _check_shapes(solution: Any) -> Any:
-    """Raise ValueError unless the arrays belong together: what was cut or edited must not get further."""
+    """Raise ValueError unless the arrays fit together, as those of a file that was edited may not."""
     path, axes = solution.path, solution.dimension
     degree = scheme(path.order).degree
     nodes = solution.steps * degree + 1

@@ -1,4 +1,4 @@
-"""What attracts in a scene: the point masses, and the rates of orbits around them."""
+"""The point masses that attract in a scene, and the rates of circular orbits around them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dmoc.effects.base import Attractor, Effect
 
 @dataclass(frozen=True)
 class Attraction:
-    """The point masses of a scene with so many axes, and whether its frame turns."""
+    """The point masses of a scene with `dimension` axes, and whether the frame of its coordinates rotates."""
 
     dimension: int
     sources: tuple[Attractor, ...]
@@ -20,7 +20,7 @@ class Attraction:
 
     @classmethod
     def of(cls, effects: Sequence[Effect], dimension: int) -> Attraction:
-        """What the effects of a scene say of themselves."""
+        """The attraction of a scene, collected from `attractor` and `turns_frame` of its effects."""
         found = tuple(source for effect in effects if (source := effect.attractor()) is not None)
         return cls(dimension, found, any(effect.turns_frame() for effect in effects))
 
@@ -31,7 +31,7 @@ class Attraction:
 
     @property
     def lone(self) -> Attractor | None:
-        """The one attractor of a frame that does not turn, around which there are orbits."""
+        """The only attractor of a scene with 2 or 3 axes and a frame that does not rotate: it has orbits."""
         alone = len(self.sources) == 1 and not self.turning and self.dimension > 1
         return self.sources[0] if alone else None
 
@@ -45,7 +45,8 @@ class Attraction:
         squares = np.zeros(len(position))
         for source in self.sources:
             distance = np.linalg.norm(position - source.place(self.dimension), axis=1)
-            # A node in the attractor has no rate: such a guess is refused by name later.
+            # A node in the attractor itself has no finite rate [1/s] and is skipped: the check of the effects
+            # refuses such a guess later and names the node.
             outside = distance > 1e-6 * distance.max()
             squares[outside] += source.mu / distance[outside] ** 3
         return np.sqrt(squares)

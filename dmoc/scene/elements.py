@@ -10,6 +10,8 @@ import numpy as np
 
 from dmoc.parts.rows import Row
 
+# The orbital elements by the names that the fields of `Orbit` have: semi-major axis [m], eccentricity [-], then
+# inclination, ascending node, argument of the periapsis and true anomaly [rad].
 ELEMENTS = ("a", "e", "i", "raan", "argp", "nu")
 
 
@@ -46,13 +48,14 @@ def element_rows(orbit: Any, q: Any, v: Any, planar: bool) -> list[Row]:
     if orbit.argp is not None:
         return rows + _periapsis_rows(orbit, e_r * x - e_s * y, e_r * y + e_s * x)
     if _is(orbit.e, 0.0):
-        # |e|^2 = 0 has no gradient where it holds: its two components instead, without dividing by h
+        # The gradient of |e|^2 vanishes where e = 0, so both components of the eccentricity vector must be 0.
+        # The second one has sqrt(mu r), the angular momentum of a circle, in place of h.
         return [*rows, Row("e_along", e_r, 0.0, 0.0), Row("e_across", ca.dot(q, v) / ca.sqrt(mu * r), 0.0, 0.0)]
     return rows if orbit.e is None else [*rows, Row("e", (e_r**2 + e_s**2) / orbit.e - orbit.e, 0.0, 0.0)]
 
 
 def _plane_rows(i: Any, raan: Any, normal: Any) -> list[Row]:
-    """Inclination and node, alone or together."""
+    """Rows for the inclination and the ascending node, whichever of the two are given."""
     if raan is None and i is not None and not _flat(i):
         return [Row("i", normal[2] - ca.cos(i), 0.0, 0.0)]
     if i is None and raan is None:
@@ -63,7 +66,8 @@ def _plane_rows(i: Any, raan: Any, normal: Any) -> list[Row]:
     rows = [Row("node", ca.dot(first, normal), 0.0, 0.0)]
     if i is None:
         return [*rows, Row("sense", ca.dot(level, normal), 0.0, np.inf)]
-    # cos i alone would have no gradient at i = 0: the normal has no part along two axes of the plane
+    # The gradient of cos i vanishes at i = 0. Instead the normal must have no component along two directions
+    # in the wanted plane: `first`, towards the node, and `second`, a quarter turn from it.
     wanted = ca.sin(i) * level + ca.vertcat(0, 0, ca.cos(i))
     second = ca.cross(wanted, first)
     tilt, sense = ca.dot(second, normal), ca.dot(wanted, normal)
@@ -72,6 +76,7 @@ def _plane_rows(i: Any, raan: Any, normal: Any) -> list[Row]:
 
 def _node(orbit: Any, normal: Any, planar: bool) -> Any:
     """Direction of the ascending node, from which argp counts."""
+    # A flat orbit has no node: argp then counts from the x axis.
     if planar or _flat(orbit.i):
         return ca.DM([1.0, 0.0, 0.0])
     if orbit.raan is not None:
@@ -80,7 +85,7 @@ def _node(orbit: Any, normal: Any, planar: bool) -> Any:
 
 
 def _anomaly_rows(orbit: Any, e_r: Any, e_s: Any, x: Any, y: Any) -> list[Row]:
-    """With a true anomaly; (x, y) is the direction of the position, counted from the node."""
+    """Rows where the true anomaly is given; (x, y) is the direction of the position, counted from the node."""
     e, argp, nu = orbit.e, orbit.argp, orbit.nu
     rows = [] if argp is None else _directed("latitude", x, y, argp + nu)
     if e is None:
@@ -90,7 +95,7 @@ def _anomaly_rows(orbit: Any, e_r: Any, e_s: Any, x: Any, y: Any) -> list[Row]:
 
 
 def _periapsis_rows(orbit: Any, e_x: Any, e_y: Any) -> list[Row]:
-    """With an argument of the periapsis; (e_x, e_y) is the eccentricity vector, counted from the node."""
+    """Rows where argp is given but no true anomaly; (e_x, e_y) is the eccentricity vector from the node."""
     e, argp = orbit.e, orbit.argp
     if e is None:
         return _directed("argp", e_x, e_y, argp)
@@ -98,12 +103,13 @@ def _periapsis_rows(orbit: Any, e_x: Any, e_y: Any) -> list[Row]:
 
 
 def _directed(name: str, x: Any, y: Any, angle: Any) -> list[Row]:
-    """(x, y) points along `angle`, and not the other way."""
+    """Rows for a vector (x, y) that points along `angle`: it lies on that line, on the right half."""
     cos, sin = ca.cos(angle), ca.sin(angle)
     return [Row(name, y * cos - x * sin, 0.0, 0.0), Row(f"{name}_sense", x * cos + y * sin, 0.0, np.inf)]
 
 
 def _is(value: Any, number: float) -> bool:
+    """Whether a value is exactly this number; a symbol never is."""
     return isinstance(value, float) and value == number
 
 
@@ -123,13 +129,15 @@ def nearest_state(
     pull = float(np.linalg.norm(np.cross(v, h) / mu - q / distance))
     e, a = _nearest_shape(wanted, 2 / distance - v @ v / mu, pull)
     parameter = distance * (1 + e) if a is None else a * (1 - e**2)
+    # The conic r = p / (1 + e cos nu) gives cos nu at this distance; where it does not reach so far, at an
+    # apsis.
     reach = np.clip((parameter / distance - 1) / (e or 1.0), -1.0, 1.0)
     nu = math.copysign(math.acos(reach), q @ v) if e > 0 else 0.0
     latitude = math.atan2(q @ side, q @ node)
     argp = wanted.get("argp", latitude - wanted.get("nu", nu))
     nu = wanted.get("nu", latitude - argp)
     if 1 + e * math.cos(nu) < 0.05:
-        # such an orbit does not reach there, or only far away: take its periapsis
+        # At this anomaly r = p / (1 + e cos nu) is over 20 p or infinite: the periapsis is taken instead.
         nu, argp = 0.0, wanted.get("argp", latitude)
     x, y = math.cos(argp + nu), math.sin(argp + nu)
     velocity = (x + e * math.cos(argp)) * side - (y + e * math.sin(argp)) * node
@@ -138,10 +146,11 @@ def nearest_state(
 
 
 def _nearest_shape(wanted: dict[str, float], curve: float, e: float) -> tuple[float, float | None]:
-    """Eccentricity and semi-major axis near a state with 1/a = `curve`; None where that does not help.
+    """Eccentricity [-] and semi-major axis [m] near a state that has 1/a = `curve` [1/m] and eccentricity `e`.
 
-    An eccentricity that is free fits the energy, is far from a parabola, and has a periapsis if an
-    angle from it is asked for.
+    The axis is None where it is not wanted and the state is on no ellipse. A free eccentricity fits the
+    energy that is wanted, stays away from 1, the parabola, and is at least 0.1 where an angle from the
+    periapsis is wanted: a circle has no periapsis.
     """
     a = wanted.get("a")
     least = 0.1 if {"argp", "nu"} & set(wanted) else 0.0
@@ -157,7 +166,7 @@ def _nearest_shape(wanted: dict[str, float], curve: float, e: float) -> tuple[fl
 
 
 def _nearest_plane(wanted: dict[str, float], h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Direction of the node, and the one a quarter turn on."""
+    """Unit vectors in the wanted plane near that of `h`: towards the node, and a quarter turn further on."""
     normal = _unit(h, [0.0, 0.0, 1.0])
     near = plane_elements(normal) | wanted
     i, raan = near["i"], 0.0 if _flat(near["i"]) else near.get("raan", 0.0)

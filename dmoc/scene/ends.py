@@ -15,11 +15,45 @@ from dmoc.basics.arguments import FreeVector, Vector, checked, entries, number, 
 from dmoc.effects.given import as_column, tried
 from dmoc.parts.rows import Row
 
+# The remedy that is told where a function of time given to `Moving` cannot be used.
 OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"
 
 
 class Boundary(ABC):
-    """A condition on time, position, velocity and mass at one end of the transfer."""
+    """A condition on time, position, velocity and mass at one end of the transfer.
+
+    A frozen dataclass that derives from this has these duties:
+
+    1. Say how many axes it has: `dimension`. A boundary that works in any number of axes gives 0, and
+       `with_dimension` then gives one with the axes of the other end.
+    2. State what must hold: `fixed` gives the entries of position and velocity that are plain numbers, `rows`
+       every other condition. Rows must be independent of each other and of the fixed entries.
+    3. Say in words what it is: `words`.
+
+    What follows has a default, and better answers make better guesses and re-solves:
+
+    4. `estimate`: a likely state for the starting guess; the default knows the fixed entries alone. `anchored`
+       says whether its position can be trusted without a look at the other end.
+    5. `structure`: everything that is built into `rows`. Fields named in `adjustable`, which may change from
+       one solve to the next without a rebuild, are left out of it and may be symbols inside `rows`.
+
+    Not its business: the other end, the path, meshes, units, scaling and multipliers. `t`, `q`, `v`, `m` are
+    CasADi expressions in SI units; `q` and `v` are columns of the problem's dimension.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class OnGround(Boundary):
+    ...     height: float
+    ...     adjustable = ("height",)
+    ...     @property
+    ...     def dimension(self):
+    ...         return 2
+    ...     def rows(self, t, q, v, m):
+    ...         return [Row("height", q[1] - self.height, 0.0, 0.0, "m")]
+    ...     def words(self):
+    ...         return f"any point at a height of {self.height:g} m"
+    """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
 
@@ -30,11 +64,11 @@ class Boundary(ABC):
 
     @property
     def structure(self) -> tuple:
-        """What cannot change in a re-solve: two boundaries with the same structure have the same rows."""
+        """The type and all that is built into the rows: equal for boundaries that one NLP can serve."""
         return (type(self),)
 
     def with_dimension(self, dimension: int) -> Boundary:
-        """The same boundary, with the number of axes filled in where it was left open."""
+        """The same boundary with this number of axes, if its own `dimension` is 0; else itself."""
         return self
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -43,13 +77,13 @@ class Boundary(ABC):
         return free, free.copy()
 
     def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
-        """Further conditions, each independent of the others and of what is fixed."""
+        """Further conditions, each independent of the others and of the fixed entries."""
         return []
 
     def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
         """A position and velocity for the starting guess; NaN where nothing is known.
 
-        `near` is a position and velocity to be close to: what the other end coasts to.
+        `near` is a position and velocity to be close to: those that the other end coasts to.
         """
         return self.fixed()
 
@@ -65,7 +99,7 @@ class Boundary(ABC):
 
 @dataclass(frozen=True)
 class State(Boundary):
-    """A position and a velocity; what is None is free.
+    """A position and a velocity; entries that are None are free.
 
     Parameters
     ----------
@@ -106,7 +140,7 @@ class State(Boundary):
 
 @dataclass(frozen=True)
 class Moving(Boundary):
-    """A state that moves: the body meets it at whatever time the transfer starts or ends.
+    """A state that moves along a known path: the body is there at the time the transfer starts or ends.
 
     Parameters
     ----------
@@ -184,7 +218,7 @@ class Moving(Boundary):
 
 @dataclass(frozen=True)
 class Condition(Boundary):
-    """Any condition: function(t, q, v, m) = 0, beside what a State fixes.
+    """Any condition function(t, q, v, m) = 0, in addition to the entries that a State fixes.
 
     Parameters
     ----------
@@ -192,7 +226,7 @@ class Condition(Boundary):
         (t [s], q [m], v [m/s], m [kg]) -> a CasADi expression or a list of them, each zero where the
         condition holds. They must be independent of each other and of what `state` fixes.
     name : str
-        What the rows are called, such as "circular".
+        Name of the rows, such as "circular".
     scale : float or sequence of float
         Typical size of each value, in its own unit.
     state : State, optional

@@ -16,7 +16,7 @@ from dmoc.scene.ends import Boundary
 
 
 class _Around(Boundary):
-    """Shared by orbits: an attractor's `mu` and `center`, which without more leaves the axes open."""
+    """The fields that orbits share: `mu` and `center` of an attractor. Without a center the axes are open."""
 
     mu: float
     center: Vector | None
@@ -37,6 +37,7 @@ class _Around(Boundary):
             if len(center) == 1 or (spatial and len(center) == 2):
                 needed = "3 axes" if spatial else "2 or 3 axes"
                 raise ValueError(f"{name} needs {needed}; got center={center!r} with {len(center)}")
+            # Coordinates of such an orbit would have fewer than four digits, and nothing could be solved.
             far = max(map(abs, center))
             if size is not None and abs(size) < 1e4 * math.ulp(far):
                 raise ValueError(
@@ -46,12 +47,13 @@ class _Around(Boundary):
         checked(self, center=center)
 
     def _anywhere(self, distance: float) -> tuple[np.ndarray, np.ndarray]:
-        """On the x axis on a circle, where nothing is known but the distance."""
+        """A state on a circle around the center, on the x axis: an estimate from the distance [m] alone."""
         center = np.array(self.center)
         x, y = np.eye(len(center))[:2]
         return center + distance * x, math.sqrt(self.mu / distance) * y
 
     def _nearest(self, wanted: dict[str, float], near: tuple) -> tuple[np.ndarray, np.ndarray]:
+        """The state near `near` that has these elements; in the plane its third entries are zero."""
         center = np.array(self.center)
         n = len(center)
         fill = np.zeros(3 - n)
@@ -142,12 +144,12 @@ class CircularOrbit(_Around):
 
 @dataclass(frozen=True)
 class Orbit(_Around):
-    """Any state whose orbital elements are those given; what is None is free.
+    """Any state whose orbital elements are those given; elements that are None are free.
 
     Stated through the energy, the components e_r = h^2/(mu r) - 1 and e_s = -(r . v) h/(mu r) of the
     eccentricity vector along and across the position, and the direction of the angular momentum, so
-    that neither e = 0 nor i = 0 is singular. Where two opposite directions meet an equation, an
-    inequality picks the right one. In the plane there are a, e, argp (from the x axis), nu and i,
+    that neither e = 0 nor i = 0 is singular. Where an equation holds for two opposite directions, an
+    inequality excludes the wrong one. In the plane there are a, e, argp (from the x axis), nu and i,
     which is 0 for counter-clockwise, pi for clockwise and None for either.
 
     Parameters
@@ -218,7 +220,7 @@ class Orbit(_Around):
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
-        # e = 0 and i = 0 or pi have rows of their own
+        # Other rows state e = 0, i = 0 and i = pi, so a change to or from one of these needs a new NLP.
         special = {"e": (0.0,), "i": (0.0, math.pi)}
         free = (name for name, value in self._given.items() if value not in special.get(name, ()))
         return ("mu", "center", *free)

@@ -35,13 +35,13 @@ class TransferProblem:
     duration : float or (float, float)
         Time of the transfer [s]; a pair (shortest, longest) leaves it free between the two.
     effects : sequence of Effect
-        What acts on the body. What is not listed costs nothing.
+        Forces and potentials that act on the body. An effect that is not listed costs no time.
     actuator : Actuator
-        What pushes it.
+        The part that pushes the body.
     objective : Objective
-        What is minimised, or maximised as `FinalMass` is.
+        The quantity that is minimised, or maximised as `FinalMass` is.
     constraints : sequence of Constraint
-        What is forbidden on the way.
+        Limits that the path keeps all along the way.
     guess : callable, tuple of arrays or Solution, optional
         Starting guess of the path: a function of the time [s] that gives the position [m], a pair
         (times, positions) of shapes (count,) and (count, dimension), or a former solution.
@@ -118,12 +118,13 @@ class TransferProblem:
 
     @cached_property
     def attraction(self) -> Attraction:
-        """What attracts in the scene."""
+        """The point masses that attract in the scene, collected from the effects."""
         return Attraction.of(self.effects, self.dimension)
 
     @property
     def adjustable_parts(self) -> tuple:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
+        # The stencils and the parameter vector of an NLP both follow this order.
         return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
 
     @property
@@ -155,6 +156,7 @@ class TransferProblem:
     def _check_clock(self) -> None:
         """Times of a transfer must differ by more than the rounding of the clock."""
         shortest = self.duration_bounds[0]
+        # With 10,000 rounding errors of the start time in a duration, 400 steps have 25 each; fewer would blur.
         if shortest < 1e4 * np.spacing(abs(self.start_time)):
             raise ValueError(
                 f"start_time {self.start_time:g} s is too late to tell times within {shortest:g} s apart; "
@@ -169,6 +171,7 @@ class TransferProblem:
                 known = velocity if constraint.limits_speed else position
                 if np.isnan(known).any():
                     continue
+                # A state on the limit itself may lie beyond it by the rounding of its own numbers.
                 excess = float(constraint.excess(position[None], velocity[None])[0])
                 if excess > 1e-9 * (np.abs(known).max() or 1.0):
                     name = f"{type(constraint).__name__} (constraint {i + 1})"
@@ -200,7 +203,7 @@ class TransferProblem:
 
 
 def _check_functions(problem: TransferProblem) -> None:
-    """What parts of the user's own give has to have the right number of entries."""
+    """Raise ValueError if a method of a user's own part gives another number of values than it must."""
     n, actuator = problem.dimension, problem.actuator
     t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
     u = ca.SX.sym("u", problem.controls)
@@ -228,6 +231,7 @@ def _check_functions(problem: TransferProblem) -> None:
 
 
 def _is_users(part: Any) -> bool:
+    """Whether the class of a part is defined outside dmoc, where no test of dmoc has looked at it."""
     return not type(part).__module__.startswith("dmoc.")
 
 

@@ -24,14 +24,16 @@ from dmoc.basics.docstrings import documented, first_line
 if TYPE_CHECKING:
     from dmoc.scene.problem import TransferProblem
 
+# A problem file defines a function of this name, which makes the problem.
 FUNCTION = "problem"
-# What the modules of problem files are called, before the file's own name.
+# The module of a problem file is named by this and the file's own name: by it a line of a user's file is
+# recognised in a traceback.
 MODULE = "dmoc_problem_"
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a problem file, with what the docstring says of it."""
+    """A parameter of a problem file, with the unit and the description in the docstring."""
 
     name: str
     default: Any
@@ -181,7 +183,7 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
 
 
 def _files() -> list[Path]:
-    """All problem files, those found first in front."""
+    """All problem files, in the order in which a name is looked for."""
     return [
         path
         for folder in folders()
@@ -202,17 +204,18 @@ def _summary(path: Path) -> str:
 
 
 def _run(path: Path, source: bytes) -> ModuleType:
-    # Dataclasses and pickle look a class's module up by name, so it has to be there.
+    # Dataclasses and pickle look a class's module up by name, so it must be known before its code runs.
     module = ModuleType(f"{MODULE}{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
+    # A traceback must show the lines of the file as it is now, not as it was when it was read before.
     linecache.checkcache(str(path))
     exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
     return module
 
 
 def _guarded(path: Path, call: Callable[[], Any]) -> Any:
-    """What the user's code returns; its exceptions become one line that names the user's own line."""
+    """The result of a user's code; its exceptions become a ValueError of one line, with the user's line."""
     try:
         return call()
     except (Exception, SystemExit) as error:
@@ -223,7 +226,7 @@ def _guarded(path: Path, call: Callable[[], Any]) -> Any:
 
 
 def users_line(error: BaseException) -> str:
-    """Where in a problem file an exception of a solve comes from, ` (FILE, line N: TEXT)`; else nothing."""
+    """` (FILE, line N: TEXT)` for an exception from a problem file that it does not name; else empty."""
     begun: BaseException | None = error
     while begun is not None:
         for frame in reversed(traceback.extract_tb(begun.__traceback__)):
@@ -240,7 +243,7 @@ def _user_line(path: Path, error: BaseException) -> tuple[int, str]:
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return error.lineno or 1, (error.text or "").strip()
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    # a call over several lines begins with a parenthesis that closes elsewhere
+    # The first line of a call over several lines ends with a parenthesis that is closed in a later one.
     return (frames[-1].lineno or 1, (frames[-1].line or "").strip().rstrip("(")) if frames else (1, "")
 
 
@@ -253,6 +256,7 @@ def _check_type(name: str, value: Any, default: Any) -> None:
         kinds = (int, float)
     elif isinstance(default, (tuple, list)):
         kinds = (tuple, list)
+    # To Python True is a whole number, but True given for a mass is a mistake.
     wrong_bool = isinstance(value, bool) and not isinstance(default, bool)
     if wrong_bool or not isinstance(value, kinds):
         raise ValueError(

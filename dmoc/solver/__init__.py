@@ -1,1 +1,1 @@
-"""Coarse to fine, to a tolerance, and why it failed."""
+"""Solving from coarse meshes to fine ones, to a tolerance, and the cause of a failure."""

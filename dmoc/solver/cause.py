@@ -13,31 +13,32 @@ from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.needs import LEAST, Relaxable
 
-# Limits are off by orders of magnitude where the guess takes more than this many times them on average.
+# A limit is far off if the guess takes more than this many times as much on average [-]: in units of such a
+# limit the slacks are so large that no solver finds them.
 FAR_OFF = 10.0
 # At most this many zones are relaxed, each alone, to find the one that is in the way.
 MOST_ZONES = 8
-# At most this many rows that cannot be met together are named ...
+# At most this many rows that cannot be met together are named, the worst first: a message must stay short.
 MOST_NAMED = 5
-# ... those that are missed by more than this part of the worst.
+# A row is named only if it is missed by more than this part of the worst miss [-].
 NAMED_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What an infeasible transfer lacks.
+    """The cause of a failure: the limits that would be enough, or the rows that cannot be met.
 
     Attributes
     ----------
     path : DiscretePath or None
         A path that meets every row, if there is one after all.
     needs : tuple of str
-        What would be enough, each by itself: "a force limit of 0.26 N (you gave 0.2 N)".
+        Changes that would be enough, each by itself: "a force limit of 0.26 N (you gave 0.2 N)".
     rows : tuple of str
         Rows that cannot be met together; empty where a limit explains it.
     excess : float
-        How much more than its limits allow the transfer needs, relative to them; infinite if no limit
-        is to blame.
+        How much more the transfer needs than its limits allow, relative to them [-]; infinite if no limit is
+        to blame.
     """
 
     path: DiscretePath | None = None
@@ -81,11 +82,11 @@ def cause_of(problem: TransferProblem, guess: DiscretePath) -> Cause:
 
 
 def _far_off(transfer: Relaxable) -> Cause | None:
-    """What is enough where limits are too small by orders of magnitude, in units of what the guess takes.
+    """The limits that are enough, where those given are too small by orders of magnitude; else None.
 
-    In units of such limits the slacks are so large that no solver finds them. The force that is needed falls
-    with the square of the duration where nothing else acts, the speed with the duration: there the search
-    for a duration begins.
+    They are found in units of the force and the speed that the guess takes: in units of the limits given the
+    slacks are so large that no solver finds them. The force that is needed falls with the square of the
+    duration where nothing else acts, the speed with the duration: there the search for a duration begins.
     """
     force, speed = (ratio if FAR_OFF < ratio < np.inf else 1.0 for ratio in transfer.taken())
     if force == speed == 1.0:
@@ -112,7 +113,7 @@ def _far_off(transfer: Relaxable) -> Cause | None:
 
 
 def _unlimited(transfer: Relaxable) -> Cause | None:
-    """The force that least effort takes without a limit: more than the least, but sooner found."""
+    """The largest force of least effort without a limit: more than the least needed, but sooner found."""
     given = transfer.given.actuator
     free = given.unlimited()
     if free is None:
@@ -132,7 +133,7 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
 
 
 def _rows(transfer: Relaxable) -> Cause:
-    """Every row made elastic: which cannot be met, and whether a constraint alone is in the way."""
+    """Every row made elastic: the rows that cannot be met, or the constraint that alone is in the way."""
     layout = transfer.nlp.rows
     slacks = np.hstack([np.eye(layout.size), -np.eye(layout.size)])
     found = Relaxation(transfer.nlp, slacks)(transfer.problem, transfer.guess)

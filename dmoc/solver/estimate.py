@@ -1,4 +1,4 @@
-"""How far off an answer is: steps integrated again, changes from mesh to mesh, an independent integrator."""
+"""The error of an answer: steps integrated again, changes from mesh to mesh, an independent integrator."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from dmoc.motion.step import step_map
 from dmoc.results.facts import Error
 from dmoc.scene.problem import TransferProblem
 
-# By how much the error falls from mesh to mesh, at least.
+# The error is taken to fall by at least this factor [-] from mesh to mesh: the error that is left, the change
+# over the factor less 1, would have no bound otherwise.
 LEAST_FALL = 1.5
-
-
+# An objective of 0 is replaced by this, the smallest number of full precision, before something is divided by
+# it.
 TINY = float(np.finfo(float).tiny)
 
 
@@ -41,8 +42,8 @@ def estimate(
 ) -> Error:
     """Errors of the last of several meshes, each a refinement of the one before, from the changes between them.
 
-    Where the error falls by a factor f from mesh to mesh, what is left is the last change over f - 1:
-    f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
+    Where the error falls by a factor f from mesh to mesh, the error that is left is the last change over
+    f - 1: f is the fall of the last two changes, at most `most`; where there is only one, at most its root.
     """
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
@@ -54,7 +55,9 @@ def estimate(
 
 
 def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
-    """What the rounding of |F| at zero adds to the objective, to first order: its derivative times itself.
+    """The part of the objective that the rounding of |F| at zero adds, to first order.
+
+    It is the width of the rounding times the derivative of the objective by it.
 
     The row sqrt(|F|^2 + e^2) = throttle, in units of the largest thrust, has the derivative
     e / sqrt(|F|^2 + e^2) by e, and its multipliers are the derivatives of the objective.
@@ -80,7 +83,8 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
     origin, march = path.position[0], step_map(dynamics, fine, path.hold).map(steps)
     for half in (0, 1):
         fractions = 0.5 * (half + fine.points)
-        # controls of one step stand side by side: axis first, then node, then step
+        # In memory the controls of one step stand together: the axis changes fastest, then the node, then the
+        # step.
         control = path.control.T
         if not path.hold:
             control = np.einsum("ij,jkn->nki", rule.values_at(fractions), path.control[at])

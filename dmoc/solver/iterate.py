@@ -1,4 +1,4 @@
-"""What is wrong with one iterate, by name: values that are not finite, and rows that do not hold."""
+"""Faults of one iterate by name: values that are not finite, and rows that do not hold."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP
 from dmoc.scene.problem import TransferProblem
 
-# At most this many rows and bounds are told of ...
+# At most this many violated rows and bounds are told of, the worst first.
 COUNT = 10
-# ... from this scaled violation on, which is above the round-off of a row that holds.
+# A row or bound is told of if its scaled violation is above this [-]: round-off alone stays below.
 SEEN = 1e-9
+# The remedy that is told where a guess lies at a place without finite values.
+REMEDY = "stay where it is defined, or give another guess"
 
 
 def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess: DiscretePath) -> None:
@@ -26,7 +28,7 @@ def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess:
     Raises
     ------
     ValueError
-        With the effect, the node and what it looked at there.
+        With the effect, the node and the arguments that the effect had there.
     """
     with np.errstate(all="ignore"):
         state = _states(problem, guess)
@@ -54,9 +56,6 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePat
     raise ValueError(f"{name} or its derivative is not a finite number at the guess; {REMEDY}")
 
 
-REMEDY = "stay where it is defined, or give another guess"
-
-
 def _states(problem: TransferProblem, guess: DiscretePath) -> tuple[np.ndarray, ...]:
     """Times, positions, velocities, masses of the nodes of a guess, side by side."""
     times = problem.start_time + guess.duration * guess.fractions
@@ -81,7 +80,7 @@ def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
 
 
 def _arguments(effect: Effect, state: list[np.ndarray]) -> str:
-    """What an effect looks at, in words: the distance to its centre where that is 0."""
+    """The arguments that an effect depends on, in words; the distance to its centre alone where that is 0."""
     position = state[1]
     center = getattr(effect, "center", None)
     offset = position - (np.zeros(len(position)) if center is None else np.asarray(center, float))
@@ -126,7 +125,7 @@ def worst_in_units(nlp: NLP, problem: TransferProblem, x, g) -> tuple[tuple[str,
 def _row(
     nlp: NLP, problem: TransferProblem, group: Group, index: int, component: int, value: float, duration: float
 ) -> tuple[float, str]:
-    """A violation of a row as the NLP states it, in words of the problem: size and unit."""
+    """Size and unit of a row's violation for a person, from its `value` in the unit that the NLP has for it."""
     if group.owner is None and group.kind == "smooth":
         # A row of motion is a momentum per mass; over the node's share of the time it is a force.
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]

@@ -24,15 +24,17 @@ from dmoc.solver.cause import Cause, cause_of
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
 
-# Give up on a coarse mesh if the transfer needs over 5 % more than its limits: its own error is far smaller.
+# The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: the error of the
+# mesh is far smaller, so a finer one cannot help.
 HOPELESS = 0.05
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
-# A mesh that fails without a reason is tried again with half its steps if it has at least this many ends.
+# A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
 LEAST_HALVED = 9
-# A free duration that fails is tried again so many times longer.
+# Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
+# the first one may have been too short.
 LONGER = 10
-# Statuses that do not tell whether there is a path at all.
+# These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
 
 
@@ -85,8 +87,8 @@ class Ladder:
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
         """The answer on the mesh of a first guess, by way of coarser meshes unless it has multipliers.
 
-        On the coarsest the guess is made anew from `given`, what the first was made from: brought there from
-        a finer mesh its controls would no longer fit its path.
+        On the coarsest mesh the guess is made anew from `given`, as the first guess was: if that one were
+        carried there from a finer mesh, its controls would no longer fit its path.
         """
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
         order, meshes = coarse_to_fine(self.problem, first)
@@ -125,7 +127,7 @@ class Ladder:
         return rung.answer.status in UNEXPLAINED and not limited and not told
 
     def _by_half(self, failed: Rung, first: DiscretePath) -> Rung:
-        """Where nothing tells why a mesh fails, one of half as many steps often does not."""
+        """A second attempt by way of half as many steps, if a mesh fails without a reason: it often works."""
         if not self._unexplained(failed) or len(first.mesh) < LEAST_HALVED:
             return failed
         half = self.solve_on(first.onto(np.append(first.mesh[:-1:2], 1.0), first.order, first.hold))
@@ -135,7 +137,7 @@ class Ladder:
         return half if half.stopped else failed
 
     def _explained(self, rung: Rung, start: DiscretePath, rounding: float | None, known: Cause | None) -> Rung:
-        """A failed attempt with its cause; where there is a path after all, the answer from there."""
+        """A failed attempt with its cause; if the search for it finds a path, the answer from there."""
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
@@ -162,6 +164,7 @@ class Ladder:
         begun = time.perf_counter()
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
         nlp = transcribe_onto(problem, guess, units_of(problem, guess), self.compiled)
+        # Later attempts start from answers, where all rows have values.
         if last is None:
             refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
@@ -188,7 +191,7 @@ class Ladder:
         return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
     def solution(self, rung: Rung, errors: dict[int, float] | None = None, **found: Any) -> Solution:
-        """What one rung found, with the whole ladder; `errors` by the number of the rung."""
+        """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung."""
         known = errors or {}
         levels = tuple(replace(one.level, error=known.get(one.number)) for one in self._rungs)
         reason = "" if rung.cause is None else rung.cause.words()

@@ -15,44 +15,48 @@ from dmoc.motion.stability import flow_matrices
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
 
-# Steps of the last mesh at each order: about as many as reach 1e-4 to 1e-6 on a smooth transfer.
+# The last mesh has this many steps at each order: they reach an error of about 1e-4 to 1e-6 on a smooth
+# transfer.
 DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
-# Steps a revolution at each order, where there are many revolutions. At order 2 they are times the root of
-# their number, since errors of the phase add up: after n revolutions in N steps the goal of `geo_raise` is
-# missed by 141 n^3 / N^2 of the path.
+# A transfer of many revolutions gets this many steps a revolution at each order. At order 2 that is multiplied
+# by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
+# goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
 A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
-# Order over many revolutions, if none is asked for.
+# A transfer of many revolutions has this order if none is asked for.
 ORDER_OF_MANY_TURNS = 6
-# Order where equal steps would be too long near an attractor, if none is asked for.
+# A transfer on which equal steps would be too long near an attractor has this order if none is asked for.
 ORDER_OF_UNEVEN = 4
 
-# Nodes of the coarsest mesh with limits, which take many iterations, and without them: then 400 nodes take
-# no longer than 100 and 400 after them.
+# The coarsest mesh has this many nodes, with limits (True) and without (False). Limits take many iterations,
+# which are cheap on 100 nodes; without limits 400 nodes at once take no longer than 100 and then 400.
 COARSEST_NODES = {True: 100, False: 400}
-# How many times finer each next mesh is, with limits and without.
+# Each mesh has up to this many times the nodes of the one before, with limits (True) and without (False).
 FINER = {True: 4, False: 16}
-# Order of the coarse mesh without limits: all is smooth there, and it is nearer the answer than finer meshes
-# of order 2.
+# The coarse mesh of a problem without limits has this order: its motion is smooth, and the answer is nearer to
+# the last one than those of finer meshes of order 2.
 SMOOTH_ORDER = 6
-# A coarse mesh has no more nodes than this to keep h omega below 1: where a guess strays far off, its rates
-# mean nothing.
+# A coarse mesh gets at most this many steps to keep h omega below 1: the rates along a guess that strays far
+# off mean nothing.
 MOST_COARSE = 400
-# Steps of order 2 over the number of revolutions to the power 1.5, for a phase that is roughly right.
+# A coarse mesh of order 2 has at least this many steps times n^1.5 for n revolutions: its phase is then roughly
+# right.
 IN_PHASE = 50
-# The rounding of |F| on the coarsest mesh, as a part of the largest thrust.
+# The rounding of |F| on the coarsest mesh is this part of the largest thrust [-].
 WIDEST_ROUNDING = 1e-2
 
-# Order and steps of the trial that a tolerance begins with.
+# A solve to a tolerance begins with a trial of this order, if none is asked for.
 TRIAL_ORDER = 4
+# The trial has this many steps, if no number is given and the motion along the guess does not need more.
 TRIAL_STEPS = 20
 
-# Equal steps are too long where the rate of the motion around attractors varies by more than this factor.
+# Equal steps are too long if the rate of the motion around attractors varies by more than this factor along the
+# guess.
 UNEVEN = 5.0
-# Places at which that rate is looked at.
+# The angle around attractors is summed up over this many steps of a guess before its mesh is graded.
 SAMPLES = 1000
-# A guess with more nodes than this is made on this many and interpolated ...
+# A guess for a mesh of more than twice this many nodes is made on this many nodes and interpolated.
 GUESSED = 2000
-# ... if that leaves at least this many nodes a revolution.
+# A guess is interpolated only if it has at least this many nodes a revolution.
 NODES_A_TURN = 100
 
 
@@ -97,7 +101,7 @@ def trial_path(
 def guess_on(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
-    """A starting guess; with very many steps made on fewer that follow its revolutions as well, and carried."""
+    """A starting guess; for very many steps it is made on fewer that follow its revolutions, and carried."""
     fewer = mesh[np.linspace(0, len(mesh) - 1, GUESSED // (order // 2) + 1).round().astype(int)]
     if given is None and problem.guess is None and len(mesh) > 2 * len(fewer):
         found = starting_guess(problem, fewer, order, hold)

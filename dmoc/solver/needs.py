@@ -1,4 +1,4 @@
-"""How far limits must give way: a transfer whose limits can be relaxed, and words for what is enough."""
+"""How far limits must give way: a transfer whose limits can be relaxed, and words for those that are enough."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ from dmoc.parts.constraint import Constraint
 from dmoc.parts.objectives import Effort
 from dmoc.scene.problem import TransferProblem
 
-# A limit gives way down to a tenth of itself while a duration is looked for that needs less of it.
+# While a duration is looked for, the slack of a limit may fall to this [-], so that the limit is a tenth of the
+# one given: a longer duration needs less than the limit.
 LEAST = -0.9
-# A chord between two nodes that cuts deeper into a zone than this part of its size leaps across it.
+# A path leaps across a zone if a chord between two nodes cuts deeper into it than this part of its size [-].
 LEAP = 0.1
-# At most this many durations are tried.
+# At most this many durations are tried before the search for one ends.
 MOST_DURATIONS = 9
-# Each duration differs from the one before by at most this, in the natural logarithm.
+# Each duration that is tried is at most this much longer or shorter than the one before, in the natural
+# logarithm.
 WIDEST = 1.0
-# The limits are met to this part of themselves in the duration that is named.
+# The search for a duration aims at one that needs this much less than the limits [-], and ends where it is
+# between 0 and twice this.
 EXACT = 1e-3
 
 
@@ -34,8 +37,8 @@ EXACT = 1e-3
 class Giving:
     """Limits that give way together: rows with the sign of their slack, unknowns with their shares.
 
-    With a slack s they must be `factor(s)` times as large, and `told(s)` says what is enough, empty if nothing
-    is. `falls` is the power of the duration with which the need falls.
+    With a slack s they must be `factor(s)` times as large, and `told(s)` says in words which limit is enough;
+    it is empty if none is. The need falls with the duration to the power `falls`.
     """
 
     told: Callable[[float], str]
@@ -72,9 +75,9 @@ class Relaxable:
         return Relaxation(self.nlp, rows, columns, below, above, least)
 
     def taken(self) -> tuple[float, float]:
-        """How many times the limits of force and of speed the guess takes on average; 0 without a limit.
+        """Mean force and mean speed along the guess over their limits [-]; 0 without a limit.
 
-        Without controls its rows of motion lack the momentum that these would have to give.
+        With controls of zero the rows of motion are off by the momentum that the controls would have to give.
         """
         nlp, time = self.nlp, self.guess.duration
         coast, rows = replace(self.guess, control=0 * self.guess.control), nlp.rows["dynamics"]
@@ -104,7 +107,7 @@ class Relaxable:
         return self._giving(told, factor, groups, self.nlp.columns["force"].indices.ravel(), falls=2)
 
     def speed(self) -> Giving | None:
-        """The limits on the speed, told of by the lowest."""
+        """The limits on the speed; messages name the lowest of them."""
         known = [
             (speed, i) for i, part in enumerate(self.problem.constraints) if (speed := part.largest_speed())
         ]
@@ -154,10 +157,12 @@ class Relaxable:
     ) -> Giving | None:
         """Rows of some groups with a limit on one side, and unknowns with limits."""
         lbx, ubx, lbg, ubg = self.bounds
+        # A row with both sides finite, an equation for example, has no side to which it could give way.
         rows = np.concatenate([*(group.indices.ravel() for group in groups), np.empty(0, int)]).astype(int)
         rows = rows[np.isfinite(lbg[rows]) != np.isfinite(ubg[rows])]
         columns = np.empty(0, int) if columns is None else columns
         above = np.where(np.isfinite(ubx[columns]), ubx[columns], 0.0)
+        # A lower limit gives way if it mirrors the upper one; a floor, such as a throttle of 0, stays.
         below = np.where(lbx[columns] == -ubx[columns], above, 0.0)
         if not len(rows) and not above.any():
             return None
@@ -195,7 +200,7 @@ class Relaxable:
         return [f"{up(needed) if needed > given else down(needed)} s (you gave {given:g} s)"]
 
     def leaps(self, path: DiscretePath) -> bool:
-        """Whether a path leaps across a zone between two nodes: with enough force it can."""
+        """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""
         inside = np.linspace(0, 1, 9)[1:-1, None, None]
         chords = (1 - inside) * path.position[:-1] + inside * path.position[1:]
         chords = chords.reshape(-1, path.position.shape[1])

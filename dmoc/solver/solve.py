@@ -49,7 +49,8 @@ def solve(
         CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
     progress : callable
         Called every iteration with (order, steps, iteration, objective, row, violation): the worst
-        violated row by name and its scaled size. Return True to stop; what it raises, this raises.
+        violated row by name and its scaled size. Return True to stop; an exception
+        that it raises ends the solve and is raised by it.
     compiled : bool
         Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
         once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with

@@ -16,9 +16,9 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
 
-# Two answers are one optimum if their objectives differ by less than this, relative ...
+# Two answers can be one optimum only if the relative difference of their objectives is at most this [-].
 SAME_OBJECTIVE = 1e-4
-# ... and their paths by less than this part of the extent.
+# Two answers can be one optimum only if their paths differ by less than this part of the extent [-].
 SAME_PATH = 1e-2
 
 
@@ -70,7 +70,7 @@ def local_optima(
 
 
 def _add(found: list[Optimum], new: Optimum) -> None:
-    """Put an optimum with its equals, or at the end."""
+    """Add the start of an optimum to an equal one that was found before, or else the optimum to the list."""
     extent = np.ptp(new.path.position, axis=0).max() or 1.0
     for i, old in enumerate(found):
         near = abs(new.objective - old.objective) <= SAME_OBJECTIVE * abs(old.objective)
@@ -95,6 +95,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
     for i, constraint in enumerate(problem.constraints):
         for way, bend in constraint.ways_round(base.position, base.fractions):
             yield f"{way} of {type(constraint).__name__} {i + 1}", replace(base, position=base.position + bend)
+    # The seed is fixed: a second run must find the same optima.
     draw = np.random.default_rng(0)
     extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0
     number = 0
@@ -106,7 +107,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
 
 
 def _turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Positions around the origin, turned by so many revolutions in the plane of their motion."""
+    """Positions around the origin, each turned by its number of `turns` in the plane of the motion."""
     padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
     normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)
     normal = normal / (np.linalg.norm(normal) or 1.0)

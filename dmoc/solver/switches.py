@@ -11,15 +11,19 @@ from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key, path_scales
 from dmoc.scene.problem import TransferProblem
 
-# A control within this share of its span of a limit is at the limit; so many nodes between make an arc.
+# A control is at a limit if it is within this part of its span from it [-]. If more than the same part of all
+# nodes [-] are in arcs between the limits, the path is singular.
 BETWEEN = 0.05
-# A control jumps where it changes by more than this part of its span from one step end to the next ...
+# A control can jump only where it changes by more than this part of its span [-] from one step end to the next.
 JUMP = 0.2
-# ... and by more than this many times what it changes beside.
+# A change of a control is a jump only if it is more than this many times the change two steps before and after
+# it.
 STEEPER = 3
-# A limit acts in a step if loosening it by its own size would change the objective by this part of it ...
+# A limit can act in a step only if loosening it by its own size would change the objective by this part of it
+# [-].
 ACTS = 1e-6
-# ... and by this part of the largest such change: the barrier leaves something beside a limit that acts.
+# A limit can act in a step only if that change is over this part of the largest one [-]: the barrier leaves
+# small multipliers where the limit does not act.
 BARRIER = 1e-3
 
 
@@ -68,10 +72,11 @@ def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> n
             continue
         share = np.abs(density).max(axis=1) / len(density) * sizes.get(key, 1.0)
         if key == POSITION_BOUNDS:
+            # At the ends, bounds hold fixed positions: they are no limits that set in.
             share[[0, -1]] = 0.0
         if len(share) > steps:
             share = share[step_nodes(steps, scheme(path.order))].max(axis=0)
-        # what the barrier leaves beside a limit that acts is no part of it
+        # The barrier leaves small multipliers at limits that do not act.
         acts = (share > ACTS * abs(objective)) & (share > BARRIER * share.max())
         found.append(np.flatnonzero(np.diff(acts)))
     return np.unique(np.concatenate(found))
@@ -86,6 +91,7 @@ def control_jumps(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.force_limit() or 1.0))
     ends = control if path.hold else control[:: path.order // 2]
     change = (np.abs(np.diff(ends, axis=0)) / span).max(axis=1)
-    # a jump takes one step, or two with a node in its middle; what goes on beyond them is a steep slope
+    # A jump takes one step, or two with a node in its middle; a change that goes on beyond them is a steep
+    # slope.
     around = np.pad(change, 2)
     return np.flatnonzero((change > JUMP) & (change > STEEPER * np.maximum(around[:-4], around[4:])))

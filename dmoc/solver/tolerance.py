@@ -1,4 +1,4 @@
-"""From an accuracy to a mesh: what the error is, where it arises, and the steps that bring it down."""
+"""From an accuracy to a mesh: how large the error is, where it arises, and the steps that bring it down."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from dmoc.solver.ladder import Ladder, Rung
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
 from dmoc.solver.switches import corners, is_singular, switch_times
 
-# Refinement ends at this many nodes ...
+# Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
-# ... or after this many meshes, by which time steps at a switch have come down to the shortest.
+# Refinement ends after this many meshes: steps at a switch have then come down to the shortest.
 MOST_MESHES = 14
 # A step in which the control jumps is cut into this many parts.
 PARTS = 4
@@ -29,7 +29,7 @@ SHORTEST = 1e-5
 ROUNDING_SHARE = 0.5
 # |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
 LEAST_ROUNDING = 1e-8
-# More switches than this are not listed.
+# The times of switches are listed only if there are no more than this many: a message must stay short.
 MOST_SWITCHES = 12
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
@@ -61,7 +61,7 @@ def climb_to_tolerance(
 
 @dataclass(frozen=True)
 class _Found:
-    """An answer on one mesh, and how far off it is."""
+    """An answer on one mesh, and its estimated error."""
 
     rung: Rung
     error: Error
@@ -116,7 +116,8 @@ class _Refinement:
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
 
-        What the rounding of |F| costs counts in the error, but no mesh brings it down: it does not decide.
+        The cost of the rounding of |F| counts in the error, but not in whether the tolerance is met: no mesh
+        brings it down.
         """
         found = estimate(self.problem, self.ladder.dynamics, path, self.changes, most)
         met = found.largest <= self.tol
@@ -170,10 +171,12 @@ def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int,
 def _cuts_of(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
     """Into how many parts to cut each step.
 
-    Two, but for those that together make little of the local errors; at corners as many as lead to the
-    shortest step wanted there, since the error falls only with the length of that step.
+    A step is cut in two, or stays whole if it is one of those that together make little of the local errors.
+    At corners it is cut into as many parts as lead to the shortest step wanted there, since the error falls
+    only with the length of that step.
     """
     parts, order = np.full(len(errors), 2), np.argsort(errors)
+    # Cutting all steps in two leaves 2^-order of the errors: steps that together make half of that can wait.
     small = np.cumsum(errors[order]) <= 0.5 * 2.0**-path.order * errors.sum()
     parts[order[small]] = 1
     for k in corners:
@@ -192,7 +195,7 @@ def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
     """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
     times = switch_times(problem, path)
-    # several within two steps of each other are one burn that this mesh does not resolve
+    # Several switches within two steps of each other are one burn that this mesh does not resolve.
     near = (
         2
         * path.duration

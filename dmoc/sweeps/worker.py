@@ -20,7 +20,7 @@ from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
-    from dmoc.motion.path import DiscretePath
+    from dmoc.motion.path import DiscretePath, Key
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
 
@@ -100,12 +100,14 @@ def unpack(text: str) -> DiscretePath:
     """The path that `pack` wrote."""
     import numpy as np
 
-    from dmoc.motion.path import DiscretePath
+    from dmoc.motion.path import DiscretePath, Key
 
     with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as held:
         arrays = dict(held)
     multipliers = {
-        name.removeprefix(MULTIPLIER): arrays.pop(name) for name in list(arrays) if name.startswith(MULTIPLIER)
+        Key.parse(name.removeprefix(MULTIPLIER)): arrays.pop(name)
+        for name in list(arrays)
+        if name.startswith(MULTIPLIER)
     }
     order, hold, duration = (arrays.pop(name).item() for name in ("order", "hold", "duration"))
     return DiscretePath(order=order, hold=hold, duration=duration, multipliers=multipliers, **arrays)
