@@ -20,7 +20,7 @@ from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
-    from dmoc.motion.path import DiscretePath, Key
+    from dmoc.motion.path import DiscretePath
     from dmoc.results.solution import Solution
     from dmoc.scene.problem import TransferProblem
 

@@ -204,7 +204,7 @@ def test_what_measures_starts_anew():
 
 
 def test_those_used_last_are_remembered(monkeypatch):
-    monkeypatch.setattr(memory, "MOST", 3)
+    monkeypatch.setattr(memory._functions, "most", 3)
     forget()
     for i in range(3):
         remembered(lambda: "made", "test", i)
