@@ -243,16 +243,12 @@ def _energy_gap(evidence: Evidence) -> float | None:
     change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
     push = evidence.point[1]
     if not evidence.path.hold:
-        parts = (
-            np.sum((evidence.force / evidence.mass[:, None] + push) * evidence.node_velocity, axis=1)
-            * evidence.weights
-        )
+        power = (evidence.force / evidence.mass[:, None] + push) * evidence.node_velocity
+        parts = np.sum(power, axis=1) * evidence.weights
     else:
         # The work of a held force is that force times the way of its step.
-        moves, middle = (
-            np.diff(evidence.position[evidence.ends], axis=0),
-            evidence.mass[evidence.at].mean(axis=0),
-        )
+        moves = np.diff(evidence.position[evidence.ends], axis=0)
+        middle = evidence.mass[evidence.at].mean(axis=0)
         work = np.sum(evidence.force * moves, axis=1) / middle
         parts = np.concatenate([work, np.sum(push * evidence.node_velocity, axis=1) * evidence.weights])
     return float(abs(change - parts.sum()) / max(0.5 * evidence.speed**2, np.abs(parts).sum()))
