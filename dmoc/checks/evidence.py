@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.flown import Flown, flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, step_nodes
@@ -64,6 +65,11 @@ class Evidence:
         if any(np.shape(reported) != true.shape for reported, true, _ in reports):
             return np.inf
         return float(np.max([np.abs(reported - true).max() / scale for reported, true, scale in reports]))
+
+    @cached_property
+    def flown(self) -> Flown:
+        """The control between nodes."""
+        return flown(self.dynamics, self.path)
 
     @cached_property
     def node_velocity(self) -> np.ndarray:

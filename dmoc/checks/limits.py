@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.dynamics import state_symbols
+from dmoc.motion.flown import BREAKS
 
 # A limit may be exceeded by this part of its scale [-]: the optimiser meets rows to a tolerance, not exactly.
 BOUND = 1e-6
@@ -24,6 +25,10 @@ FEWEST = 8
 # All gaps together are looked at in no more places than this, unless the fewest of each gap are more: that
 # bounds the memory.
 MOST_PLACES = 1_000_000
+
+
+# The control is looked at in this many places of each piece of it, which is a step as a rule.
+FLOWN_AT = 17
 
 
 @dataclass(frozen=True)
@@ -51,12 +56,15 @@ def excesses(evidence: Evidence) -> list[Excess]:
 
 
 def _controls(evidence: Evidence) -> Iterable[Excess]:
-    """Limits of the actuator, at the nodes or, with hold, in the steps."""
+    """Limits of the actuator, at the nodes or, with hold, in the steps, and between the nodes as flown."""
     actuator, control = evidence.problem.actuator, evidence.path.control
     scale = actuator.force_limit() or evidence.largest or 1.0
     yield Excess("force", _most(actuator.excess(control)), BOUND * scale, "N")
     u = ca.SX.sym("u", control.shape[1])
     yield from _row_excess("actuator", actuator.rows(u), [u], [control.T])
+    if actuator.force_limit() is not None and not evidence.path.hold:
+        _, between = evidence.flown.sampled(FLOWN_AT)
+        yield Excess("force between nodes", _most(actuator.beyond(between)), (BREAKS + BOUND) * scale, "N")
     if actuator.dry_mass > 0:
         missing = _most(actuator.dry_mass - evidence.mass)
         yield Excess("dry mass", missing, BOUND * evidence.problem.mass, "kg")

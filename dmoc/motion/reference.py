@@ -11,8 +11,8 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.step import weighted
 
@@ -27,17 +27,17 @@ def reference(
     """Position [m] and velocity [m/s] at the goal by DOP853, from the start with the path's controls.
 
     Dormand and Prince's Runge-Kutta method of order 8 with the coefficients and the error estimate of
-    SciPy, on the equations of motion: it knows nothing of the scheme. The control is the polynomial
-    through each step's Lobatto nodes, with hold the held value; the integrator restarts at every step
-    end, where its derivatives jump, and cuts a step in parts until its error is below 1e-11.
+    SciPy, on the equations of motion: it knows nothing of the scheme. The control is the one that is flown
+    (`dmoc.motion.flown`), with hold the held value; the integrator restarts wherever its derivatives jump,
+    and cuts pieces in parts until its error is below 1e-11.
 
     Returns
     -------
     position, velocity : arrays
         NaN where the motion cannot be integrated.
     """
-    n, steps = dynamics.positions, len(path.mesh) - 1
-    control = _control_powers(dynamics, path)
+    control, mesh = _control_powers(dynamics, path)
+    n, steps = dynamics.positions, len(mesh) - 1
     start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
     march_one = remembered(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
     given = march_one.mx_in()[:-2]
@@ -49,8 +49,8 @@ def reference(
         share = 1 / parts[owner]
         # The i-th part of a step begins at i times its share of the step.
         begin = (np.arange(len(owner)) - (np.cumsum(parts) - parts)[owner]) * share
-        h = path.duration * np.diff(path.mesh)[owner]
-        times = start_time + path.duration * path.mesh[:-1][owner]
+        h = path.duration * np.diff(mesh)[owner]
+        times = start_time + path.duration * mesh[:-1][owner]
         march = advance.mapaccum(len(owner))
         states, errors = march(start, control[:, owner], times[None], h[None], begin[None], share[None])
         worst = np.zeros(steps)
@@ -66,15 +66,14 @@ def reference(
     return np.full(n, np.nan), np.full(n, np.nan)
 
 
-def _control_powers(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
-    """Controls of every step as a polynomial in the fraction of the step, shape (size (s+1), steps)."""
+def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
+    """Controls of every piece as a polynomial in its fraction, shape (size (s+1), pieces), and their mesh."""
     if path.hold:
-        return path.control.T
-    rule = scheme(path.order)
-    nodes = path.control[step_nodes(len(path.mesh) - 1, rule)]
-    to_powers = np.linalg.inv(np.vander(rule.points, increasing=True))
-    powers = np.einsum("pj,jkn->pnk", to_powers, nodes)
-    return powers.reshape(-1, powers.shape[2])
+        return path.control.T, path.mesh
+    known = flown(dynamics, path)
+    to_powers = np.linalg.inv(np.vander(scheme(path.order).points, increasing=True))
+    powers = np.einsum("pj,jkn->pnk", to_powers, known.nodes)
+    return powers.reshape(-1, powers.shape[2]), known.mesh
 
 
 def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:

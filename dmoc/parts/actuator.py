@@ -149,6 +149,13 @@ class Actuator(ABC):
         """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value * (self.force_limit() or 1.0), "N"
 
+    def beyond(self, u: np.ndarray) -> np.ndarray:
+        """By how much controls between nodes are beyond what it can do [N], shape (count,).
+
+        Between nodes a control need not keep what ties its entries together, such as a throttle to a force.
+        """
+        return self.excess(u)
+
     def words(self) -> str:
         """One line for a person."""
         return "any force, without a limit"

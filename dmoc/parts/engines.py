@@ -152,6 +152,14 @@ class Engine(_Burner):
         unpaid = np.abs(np.hypot(thrust, self.smoothing * self.max_thrust) - u[:, -1])
         return np.maximum(0.0, np.maximum(over, unpaid))
 
+    def beyond(self, u: np.ndarray) -> np.ndarray:
+        thrust, throttle = np.linalg.norm(u[:, :-1], axis=1), u[:, -1]
+        over = np.maximum(thrust - self.max_thrust, self.min_thrust - throttle)
+        if self.box is not None:
+            over = np.maximum(over, (np.abs(u[:, :-1]) - np.asarray(self.box)).max(axis=1))
+        # What is flown must have been paid for.
+        return np.maximum(0.0, np.maximum(over, thrust - throttle))
+
     def words(self) -> str:
         floor = f" and at least {self.min_thrust:g} N" if self.min_thrust else ""
         return f"an engine of at most {self.max_thrust:g} N{floor}{self._burning_words()}"

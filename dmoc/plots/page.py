@@ -23,7 +23,6 @@ from dmoc.plots.style import (
     WARNING,
     readable,
     speeds,
-    within_steps,
 )
 from dmoc.results.solution import Solution
 
@@ -138,7 +137,7 @@ def _draw_force(axes: Any, solution: Solution, late: float) -> None:
     size, unit = readable(solution.force, "N")
     times, force = solution.end_times, solution.force
     if not solution.hold:
-        times, force = within_steps(solution, force)
+        times, force = flown_force(solution)
     curves = [
         (f"$F_{axis}$", force[:, i], AXIS_COLOURS[i], AXIS_LINES[i])
         for i, axis in enumerate("xyz"[: solution.dimension])

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.march import force_of
 from dmoc.motion.mesh import step_nodes
 from dmoc.results.solution import Solution
 
@@ -64,6 +67,12 @@ _UNITS = {
 }
 
 
+# A curve has about this many points in all ...
+POINTS = 600
+# ... and no more than this many in one step.
+MOST_WITHIN = 30
+
+
 def readable(values: Any, unit: str) -> tuple[float, str]:
     """(size of the unit to draw in, its name) for values given in SI."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
@@ -79,10 +88,24 @@ def within_steps(solution: Solution, values: np.ndarray) -> tuple[np.ndarray, np
     rule = scheme(solution.order)
     if rule.degree == 1:
         return solution.time, values
-    fractions = np.linspace(0.0, 1.0, int(np.clip(600 // solution.steps, 2 * rule.degree, 30)))
+    fractions = np.linspace(0.0, 1.0, int(np.clip(POINTS // solution.steps, 2 * rule.degree, MOST_WITHIN)))
     nodes = values[step_nodes(solution.steps, rule)]
     fine = np.einsum("pj,jkn->kpn", rule.values_at(fractions), nodes)
     return _times(solution, fractions), fine.reshape(-1, values.shape[1])
+
+
+def flown_force(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and force [N] of the control that is flown, close enough to draw.
+
+    Without the problem, whose limits decide what is flown, along the polynomials of the steps.
+    """
+    rule = scheme(solution.order)
+    if rule.degree == 1 or solution.problem is None:
+        return within_steps(solution, solution.force)
+    dynamics = Dynamics.of(solution.problem)
+    count = int(np.clip(POINTS // solution.steps, 2 * rule.degree, MOST_WITHIN))
+    fractions, control = flown(dynamics, solution.path).sampled(count)
+    return solution.provenance.start_time + solution.duration * fractions, force_of(dynamics, control)
 
 
 def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:

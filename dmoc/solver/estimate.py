@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
@@ -49,9 +52,29 @@ def estimate(
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
     extent, speed = path_scales(path)
     position, velocity = reference(dynamics, path, problem.start_time, path.start_velocity)
+    cost += idle_share(dynamics, path)
     miss = np.linalg.norm(position - path.position[-1]) / extent
     slip = np.linalg.norm(velocity - path.goal_velocity) / speed
     return Error(moved, cost, float(max(miss, slip)))
+
+
+def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
+    """The part of the impulse that is paid for and not flown [-]: in a step where a control switches.
+
+    Zero where the controls do not tell what is paid.
+    """
+    if path.hold or dynamics.actuator.throttle(path.control[0]) is None:
+        return 0.0
+    known = flown(dynamics, path)
+    h = np.diff(known.mesh)
+    rule, many = scheme(path.order), scheme(8)
+    fine = np.einsum("pj,jkn->pkn", rule.values_at(many.points), known.nodes)
+    thrust = np.linalg.norm(force_of(dynamics, fine.reshape(-1, fine.shape[2])), axis=1).reshape(fine.shape[:2])
+    u = ca.SX.sym("u", fine.shape[2])
+    throttle = ca.Function("throttle", [u], [dynamics.actuator.throttle(u)])
+    paid = throttle(fine.reshape(-1, fine.shape[2]).T).full().reshape(fine.shape[:2])
+    total = float(many.weights @ paid @ h)
+    return abs(total - float(many.weights @ thrust @ h)) / total if total else 0.0
 
 
 def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:

@@ -1,0 +1,112 @@
+"""The control that is flown between the nodes of a path.
+
+The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
+equations. Where the polynomial breaks the actuator's limit, as it does where the control switches inside the
+step, something else of the same impulse is flown there, within the limit: two constant pieces that keep the
+first moment of the control as well, where there are any, or else the mean of the node values with the scheme's
+weights. The limits are convex sets, so that mean obeys them, and no impulse is flown that is not paid for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import Scheme, scheme
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.path import DiscretePath
+
+# The polynomial of a step is flown if it exceeds no limit by more than this part of it: on an arc where the
+# control turns at its limit, a polynomial through the nodes exceeds it by less.
+BREAKS = 1e-4
+# Places in a step at which the polynomial is held against the limit.
+LOOKED_AT = np.linspace(0.0, 1.0, 17)
+# Fractions of a step at which two constant pieces may meet.
+MEETINGS = np.linspace(0.02, 0.98, 49)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """The control of a path, piece by piece.
+
+    Attributes
+    ----------
+    mesh : array, shape (pieces+1,)
+        Ends of the pieces as fractions of the duration. A piece is a step or a part of one.
+    nodes : array, shape (s+1, pieces, size)
+        Controls at the Lobatto points of each piece: it is the polynomial through them.
+    broken : array of bool, shape (steps,)
+        Steps whose own polynomial breaks the limit of the actuator.
+    """
+
+    mesh: np.ndarray
+    nodes: np.ndarray
+    broken: np.ndarray
+
+    def sampled(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Fractions of the duration and controls at so many places of each piece, its ends among them.
+
+        Shapes (pieces * count,) and (pieces * count, size).
+        """
+        rule, at = scheme(2 * (len(self.nodes) - 1)), np.linspace(0.0, 1.0, count)
+        values = np.einsum("pj,jkn->kpn", rule.values_at(at), self.nodes)
+        fractions = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * at
+        return fractions.ravel(), values.reshape(-1, values.shape[2])
+
+
+def flown(dynamics: Dynamics, path: DiscretePath) -> Flown:
+    """The control that is flown with the controls of a path."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    if path.hold:
+        nodes = np.broadcast_to(path.control, (rule.degree + 1, *path.control.shape))
+        return Flown(path.mesh, nodes, np.zeros(steps, bool))
+    nodes = path.control[step_nodes(steps, rule)]
+    broken = _broken(dynamics, rule, nodes)
+    return Flown(path.mesh, nodes, broken) if not broken.any() else _mended(dynamics, rule, path, nodes, broken)
+
+
+def _broken(dynamics: Dynamics, rule: Scheme, nodes: np.ndarray) -> np.ndarray:
+    """Steps whose polynomial breaks the limit between its nodes."""
+    limit = dynamics.actuator.force_limit()
+    if rule.degree == 1 or limit is None:
+        # A straight line between two controls within a convex limit stays within it.
+        return np.zeros(nodes.shape[1], bool)
+    values = np.einsum("pj,jkn->pkn", rule.values_at(LOOKED_AT), nodes)
+    return _beyond(dynamics, values).max(axis=0) > BREAKS * limit
+
+
+def _beyond(dynamics: Dynamics, controls: np.ndarray) -> np.ndarray:
+    """By how much controls of shape (..., size) are beyond what the actuator can do [N]."""
+    flat = controls.reshape(-1, controls.shape[-1])
+    return dynamics.actuator.beyond(flat).reshape(controls.shape[:-1])
+
+
+def _mended(
+    dynamics: Dynamics, rule: Scheme, path: DiscretePath, nodes: np.ndarray, broken: np.ndarray
+) -> Flown:
+    """The same impulse within the limit in the steps whose polynomial breaks it."""
+    mean = np.einsum("j,jkn->kn", rule.weights, nodes[:, broken])
+    moment = np.einsum("j,jkn->kn", rule.weights * (rule.points - 0.5), nodes[:, broken])
+    # Pieces that meet at tau have the mean m and the first moment d about the middle of the step if they are
+    # m - 2d/tau and m + 2d/(1 - tau).
+    meeting = MEETINGS[:, None, None]
+    pieces = np.stack([mean - 2 * moment / meeting, mean + 2 * moment / (1 - meeting)])
+    excess = _beyond(dynamics, pieces).max(axis=0)
+    best = np.argmin(excess, axis=0)
+    every = np.arange(len(mean))
+    fits = excess[best, every] <= BREAKS * (dynamics.actuator.force_limit() or 0.0)
+    first, second = pieces[:, best, every]
+    first[~fits] = second[~fits] = mean[~fits]
+    counts = np.ones(len(broken), int)
+    counts[np.flatnonzero(broken)[fits]] = 2
+    step, place = np.repeat(np.arange(len(broken)), counts), np.cumsum(counts) - counts
+    found = nodes[:, step].copy()
+    found[:, place[broken]] = first
+    found[:, place[broken] + counts[broken] - 1] = second
+    ends = path.mesh[step]
+    halves = place[broken][fits] + 1
+    at = np.flatnonzero(broken)[fits]
+    ends[halves] += MEETINGS[best[fits]] * np.diff(path.mesh)[at]
+    return Flown(np.append(ends, path.mesh[-1]), found, broken)
