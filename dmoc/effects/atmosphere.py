@@ -10,7 +10,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number, short, vector
 from dmoc.effects.base import Force, Part
-from dmoc.effects.given import as_column, tried
+from dmoc.effects.user_functions import as_column, tried
 
 # Drag computes the speed |w| against the air as sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], which has derivatives of
 # every order at rest too; a micrometre a second changes no force that matters.

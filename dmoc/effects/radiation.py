@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, matching_length, number, short
 from dmoc.effects.base import Force, Part
-from dmoc.effects.given import given_motion, position_at
+from dmoc.effects.user_functions import given_motion, position_at
 
 # Pressure of sunlight on a black surface at one astronomical unit from the sun [N/m^2].
 SOLAR_PRESSURE = 4.56e-6

@@ -9,7 +9,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number
 from dmoc.effects.base import Conservative
-from dmoc.effects.given import given_motion, position_at
+from dmoc.effects.user_functions import given_motion, position_at
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
+from dmoc.nlp.ipopt_options import settings_for
 from dmoc.nlp.program import Program
-from dmoc.nlp.settings import settings_for
 from dmoc.results.facts import Level, Provenance
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem

@@ -21,6 +21,7 @@ from dmoc.plots.style import (
     PUSH,
     SETTINGS,
     WARNING,
+    flown_force,
     readable,
     speeds,
 )

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.parts.outline import Ball, Box
-from dmoc.plots.scene import Corners, draw_scene, outlines, view_of
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
+from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
 from dmoc.results.solution import Solution
 
 # Step ends are drawn as dots if there are at most this many steps: more would hide the line.

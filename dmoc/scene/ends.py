@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, Vector, checked, entries, number, same_length, short, vector
-from dmoc.effects.given import as_column, tried
+from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.rows import Row
 
 # The remedy that is told where a function of time given to `Moving` cannot be used.

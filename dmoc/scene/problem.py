@@ -12,7 +12,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Conservative, Effect
-from dmoc.effects.given import evaluated
+from dmoc.effects.user_functions import evaluated
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce

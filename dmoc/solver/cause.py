@@ -1,4 +1,4 @@
-"""Why a solve failed, in the user's words and units, and what would have to give way."""
+"""Why a solve failed, in the user's words and units, and what would be enough; parts phrase their own limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.needs import LEAST, Relaxable
+from dmoc.solver.relaxable import LEAST, Relaxable
 
 # A limit is far off if the guess takes more than this many times as much on average [-]: in units of such a
 # limit the slacks are so large that no solver finds them.

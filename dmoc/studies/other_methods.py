@@ -18,7 +18,7 @@ import numpy as np
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import make_solver, status_of
-from dmoc.nlp.settings import settings_for, tolerance
+from dmoc.nlp.ipopt_options import settings_for, tolerance
 from dmoc.scene.problem import TransferProblem
 
 

@@ -1,4 +1,4 @@
-"""How far limits must give way: a transfer whose limits can be relaxed, and words for those that are enough."""
+"""How far limits must give way: a transfer whose limits can be relaxed, one by one or together."""
 
 from __future__ import annotations
 
