@@ -249,6 +249,9 @@ The solver always returns, whatever its status. A plan can be flown if `largest_
 (of rows and bounds, scaled) are small; that it is an optimum only the status says. Where a plan fails,
 `residual` [N] shows for every node, `violations_...` for every bound and row, shaped like its multipliers.
 
+Between nodes the control is the polynomial through the nodes of each step. Where that breaks a limit, as it may
+at a switch, hold the mean of the step's node values with the weights of the scheme: it has the same impulse.
+
 To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too,
 moved on to the new times. What is no input of the solver is fixed in it.
 

@@ -42,6 +42,12 @@ DUAL_UNITS = {
     "duration": "s",
 }
 
+# How the control goes on from one node to the next.
+BETWEEN = (
+    "; within a step the polynomial through its nodes or, where that breaks a limit, two constant pieces of "
+    "the same impulse and first moment, or the weighted mean"
+)
+
 
 def write(solution: Any, path: str | os.PathLike) -> None:
     """Write a Solution to a netCDF-4 file, whole or not at all."""
@@ -69,6 +75,7 @@ def to_dataset(solution: Any) -> Any:
 def _variables(solution: Any) -> Table:
     path, about = solution.path, solution.provenance
     at = "step" if path.hold else "node"
+    between = ", held over each step" if path.hold else BETWEEN
     control_unit = ", ".join(dict.fromkeys(about.control_units))
     table = {
         "time": (("node",), solution.time, "s", "time"),
@@ -77,8 +84,8 @@ def _variables(solution: Any) -> Table:
         "position": (("node", "axis"), path.position, "m", "position"),
         "velocity": (("end", "axis"), solution.velocity, "m/s", "velocity from the discrete momenta"),
         "momentum": (("end", "axis"), solution.momentum, "m/s", "discrete momentum per unit mass"),
-        "force": ((at, "axis"), solution.force, "N", "force of the actuator"),
-        "control": ((at, "channel"), path.control, control_unit, "control"),
+        "force": ((at, "axis"), solution.force, "N", f"force of the actuator{between}"),
+        "control": ((at, "channel"), path.control, control_unit, f"control{between}"),
         "mass": (("node",), path.mass, "kg", "mass"),
         "start_velocity": (("axis",), path.start_velocity, "m/s", "velocity at the start"),
         "goal_velocity": (("axis",), path.goal_velocity, "m/s", "velocity at the goal"),

@@ -1,4 +1,4 @@
-"""Why a solve failed, in the user's words and units, and what would be enough; parts phrase their own limits."""
+"""Why a solve failed, in the user's words and units, and what would be enough; parts phrase their limits."""
 
 from __future__ import annotations
 

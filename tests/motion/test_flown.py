@@ -1,0 +1,111 @@
+"""The control between nodes: within the limit, with the impulse of the discrete equations, paid for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmoc import BallForce, BoxForce, Engine, FreeForce, State, Time, TransferProblem, solve, verify
+from dmoc.checks.evidence import Evidence
+from dmoc.checks.limits import excesses
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.flown import BREAKS, flown
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.problem_file import load_problem
+
+REST = State((0, 0), (0, 0))
+
+
+def switching(actuator):
+    start = State((0, 0), (0.3, -0.2))
+    return TransferProblem(1.0, start, State((1, 0.3), (0, 0)), (0.5, 5.0), actuator=actuator, objective=Time())
+
+
+def path_with(order, controls, size=2):
+    """A path of a few steps whose controls are given, nothing else of which is looked at."""
+    steps = (len(controls) - 1) // (order // 2)
+    mesh, nodes = np.linspace(0.0, 1.0, steps + 1), len(controls)
+    at = np.zeros((nodes, 2))
+    return DiscretePath(mesh, order, False, 2.0, at, controls, np.ones(nodes), at[0], at[0])
+
+
+def impulse(known):
+    """Integral of the control over the fractions of the duration."""
+    weights = scheme(2 * (len(known.nodes) - 1)).weights
+    return np.einsum("j,k,jkn->n", weights, np.diff(known.mesh), known.nodes)
+
+
+@pytest.mark.parametrize("order", [4, 6, 8])
+@pytest.mark.parametrize("actuator", [BoxForce(1.0), BallForce(1.0)])
+def test_it_keeps_the_limit_where_the_polynomial_breaks_it(order, actuator):
+    path = solve(switching(actuator), order=order, steps=9).raise_for_status().path
+    dynamics = Dynamics.of(switching(actuator))
+    known = flown(dynamics, path)
+    polynomials = flown(replace(dynamics, actuator=FreeForce()), path)
+    assert known.broken.any() and not polynomials.broken.any()
+    assert actuator.excess(polynomials.sampled(33)[1]).max() > 0.01
+    assert actuator.excess(known.sampled(33)[1]).max() <= 1.1 * BREAKS
+    assert impulse(known) == pytest.approx(impulse(polynomials), abs=1e-14)
+
+
+def test_a_switch_keeps_the_first_moment_by_two_pieces():
+    """From +1 to -1 at 0.3 of the only step of order 4: the node values give both pieces back."""
+    rule, tau = scheme(4), 0.3
+    mean, moment = 2 * tau - 1, tau * (tau - 1)  # of the control, and of it times (place - 1/2)
+    # Three node values with this mean and moment, the first at the limit.
+    matrix = np.vstack([rule.weights, rule.weights * (rule.points - 0.5), [1.0, 0.0, 0.0]])
+    values = np.linalg.solve(matrix, [mean, moment, 1.0])
+    controls = np.column_stack([values, np.zeros(3)])
+    problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
+    known = flown(Dynamics.of(problem), path_with(4, controls))
+    assert known.mesh == pytest.approx([0.0, tau, 1.0], abs=0.011)
+    assert known.nodes[:, 0, 0] == pytest.approx(1.0, abs=0.05)
+    assert known.nodes[:, 1, 0] == pytest.approx(-1.0, abs=0.05)
+
+
+def test_a_control_without_a_moment_is_held_at_its_mean():
+    controls = np.column_stack([[1.0, 1.0, -1.0, 1.0, 1.0], np.zeros(5)])
+    problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
+    known = flown(Dynamics.of(problem), path_with(8, controls))
+    assert known.broken.all()
+    assert known.nodes[:, :, 0] == pytest.approx(scheme(8).weights @ controls[:, 0])
+
+
+def test_where_two_pieces_do_not_fit_the_mean_is_held():
+    rule = scheme(8)
+    matrix = np.vstack([rule.weights, rule.weights * (rule.points - 0.5)])
+    # With so large a moment about a mean so near the limit any two pieces would exceed it.
+    values = np.linalg.lstsq(matrix, np.array([0.95, 0.2]), rcond=None)[0]
+    problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
+    known = flown(Dynamics.of(problem), path_with(8, np.column_stack([values, np.zeros(5)])))
+    assert len(known.mesh) == 2 and known.nodes[:, 0, 0] == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize("order, tol", [(8, None), (4, 1e-4)])
+def test_an_engine_flies_no_more_impulse_than_it_pays_for(order, tol):
+    problem = load_problem("two_body_fuel").make()
+    solution = solve(problem, order=order, tol=tol)
+    fractions, control = flown(Dynamics.of(problem), solution.path).sampled(65)
+    pieces = control.reshape(-1, 65, control.shape[1])
+    spans = fractions.reshape(-1, 65)
+    thrust = np.trapezoid(np.linalg.norm(pieces[:, :, :-1], axis=2), spans, axis=1).sum()
+    paid = np.trapezoid(pieces[:, :, -1], spans, axis=1).sum()
+    assert thrust < paid * (1 + 1e-5)
+
+
+@pytest.mark.parametrize("order", [4, 8])
+def test_the_checks_judge_what_is_flown(order):
+    solution = solve(switching(BoxForce(1.0)), order=order, steps=9)
+    assert verify(solution).ok
+    (limit,) = [one for one in excesses(Evidence(solution)) if one.name == "force between nodes"]
+    assert limit.ok and limit.unit == "N"
+
+
+def test_where_nothing_breaks_the_polynomials_are_flown():
+    problem = load_problem("orbit_raise").make()
+    path = solve(problem, order=6, steps=20).path
+    known = flown(Dynamics.of(problem), path)
+    assert not known.broken.any() and np.array_equal(known.mesh, path.mesh)
+    engine = replace(problem, actuator=Engine(10.0))
+    assert not flown(Dynamics.of(replace(engine, actuator=FreeForce())), path).broken.any()
