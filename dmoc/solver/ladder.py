@@ -144,6 +144,10 @@ class Ladder:
         cause = cause_of(self._rounded(rounding), start)
         return replace(rung, cause=cause) if cause.path is None else self.solve_on(cause.path, rounding)
 
+    def try_on(self, guess: DiscretePath, rounding: float | None, most: int) -> Rung:
+        """One attempt of at most so many iterations, to see where a guess leads."""
+        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most})
+
     def solve_on(self, guess: DiscretePath, rounding: float | None = None) -> Rung:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
         problem = self._rounded(rounding)
@@ -157,7 +161,9 @@ class Ladder:
             guess = out_of_tube(tubed.path)
         return self._attempt(guess, problem)
 
-    def _attempt(self, guess: DiscretePath, problem: TransferProblem) -> Rung:
+    def _attempt(
+        self, guess: DiscretePath, problem: TransferProblem, limits: dict[str, Any] | None = None
+    ) -> Rung:
         last = self._rungs[-1] if self._rungs else None
         if last is not None and self.interrupt.seen:
             return replace(last, answer=replace(last.answer, status="stopped"))
@@ -168,7 +174,7 @@ class Ladder:
         if last is None:
             refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
-        solver = nlp.solver(self.options, bool(guess.multipliers), carried, watch)
+        solver = nlp.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
         built = time.perf_counter() - begun
         answer = nlp.run(solver, problem, guess)
         if watch.error is not None:

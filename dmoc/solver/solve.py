@@ -10,7 +10,8 @@ from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import first_path
+from dmoc.solver.meshes import ORDER_OF_MANY_TURNS, first_path
+from dmoc.solver.revolutions import best_revolutions, without_multipliers
 from dmoc.solver.tolerance import climb_to_tolerance
 
 
@@ -80,10 +81,14 @@ def solve(
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
         tol = _tolerance(tol)
-        with ladder.interrupt:
-            return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
-    first = first_path(problem, order, steps, hold, guess, mesh)
     with ladder.interrupt:
+        best = best_revolutions(ladder, hold) if guess is None and tol is None else None
+        if best is not None:
+            guess = without_multipliers(best.path)
+            order = order or (2 if hold else ORDER_OF_MANY_TURNS)
+        if tol is not None:
+            return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
+        first = first_path(problem, order, steps, hold, guess, mesh)
         return ladder.solution(ladder.climb_to(first, guess))
 
 
