@@ -27,6 +27,8 @@ PARTS = 4
 SHORTEST = 1e-5
 # The rounding of |F| may cost this part of the tolerance.
 ROUNDING_SHARE = 0.5
+# An attempt with |F| rounded less is given up after this many iterations: it takes 20 to 100 or leads nowhere.
+MOST_SHARPENING = 200
 # |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
 LEAST_ROUNDING = 1e-8
 # The times of switches are listed only if there are no more than this many: a message must stay short.
@@ -136,7 +138,7 @@ class _Refinement:
         width = self.problem.actuator.smoothing
         while width is not None and self.rounded > ROUNDING_SHARE * self.tol and width > LEAST_ROUNDING:
             width = max(width * max(0.5 * ROUNDING_SHARE * self.tol / self.rounded, 0.1), LEAST_ROUNDING)
-            sharper = self.ladder.solve_on(rung.path, width)
+            sharper = self.ladder.try_on(rung.path, width, MOST_SHARPENING)
             if not sharper.solved:
                 return
             rung, self.problem = sharper, sharper.problem

@@ -12,10 +12,10 @@ from dmoc.solver.switches import switch_times
 
 # Problem, tolerance, optimum, most steps that this may take (a few times what it takes), order.
 KNOWN = [
-    ("bang_bang", 1e-6, 2.0, 100, 4),
+    ("bang_bang", 1e-6, 2.0, 150, 4),
     ("lunar_landing", 1e-6, 8.246211251, 200, 4),
     ("drone_hop", 1e-6, 211.4604947, 200, 4),
-    ("earth_mars", 1e-6, 3.31922028, 200, 4),
+    ("earth_mars", 1e-6, 3.31922028, 280, 4),
     ("two_body_fuel", 1e-4, 0.0767810993, 200, 4),
     ("two_body_fuel", 1e-5, 0.0767810993, 400, 4),
     ("goddard", 1e-4, 1.012836918, 800, 2),
