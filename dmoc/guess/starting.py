@@ -20,9 +20,16 @@ from dmoc.scene.problem import TransferProblem
 
 
 def starting_guess(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any = None
+    problem: TransferProblem,
+    mesh: np.ndarray,
+    order: int,
+    hold: bool,
+    given: Any = None,
+    duration: float | None = None,
 ) -> DiscretePath:
     """A guess on the mesh: from `given`, else from the problem's own guess, else from its physics.
+
+    It lasts `duration` [s] or, without one, as long as the problem says or the transfer is likely to need.
 
     Raises
     ------
@@ -38,7 +45,7 @@ def starting_guess(
             )
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
-    duration = guess_duration(problem)
+    duration = duration or guess_duration(problem)
     spiral = False
     if given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)

@@ -2,9 +2,9 @@
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
 equations. Where the polynomial breaks the actuator's limit, as it does where the control switches inside the
-step, something else of the same impulse is flown there, within the limit: two constant pieces that keep the
-first moment of the control as well, where there are any, or else the mean of the node values with the scheme's
-weights. The limits are convex sets, so that mean obeys them, and no impulse is flown that is not paid for.
+step, two constant pieces of the same impulse are flown there, within the limit. Of all such pieces, those keep
+the most of the control's first moment about the middle of the step. The limits are convex sets: the mean of the
+node values with the scheme's weights, which keeps none of it, obeys them. No impulse is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ BREAKS = 1e-4
 LOOKED_AT = np.linspace(0.0, 1.0, 17)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
+# Halvings of the interval for how far apart the pieces may be: to a millionth.
+HALVINGS = 21
 
 
 @dataclass(frozen=True)
@@ -92,21 +94,35 @@ def _mended(
     # Pieces that meet at tau have the mean m and the first moment d about the middle of the step if they are
     # m - 2d/tau and m + 2d/(1 - tau).
     meeting = MEETINGS[:, None, None]
-    pieces = np.stack([mean - 2 * moment / meeting, mean + 2 * moment / (1 - meeting)])
-    excess = _beyond(dynamics, pieces).max(axis=0)
-    best = np.argmin(excess, axis=0)
+    apart = np.stack([-2 * moment / meeting, 2 * moment / (1 - meeting)])
+    share = _share_within(dynamics, mean, apart)
+    best = np.argmax(share, axis=0)
     every = np.arange(len(mean))
-    fits = excess[best, every] <= BREAKS * (dynamics.actuator.force_limit() or 0.0)
-    first, second = pieces[:, best, every]
-    first[~fits] = second[~fits] = mean[~fits]
-    counts = np.ones(len(broken), int)
-    counts[np.flatnonzero(broken)[fits]] = 2
-    step, place = np.repeat(np.arange(len(broken)), counts), np.cumsum(counts) - counts
+    first, second = mean + share[best, every][:, None] * apart[:, best, every]
+    step = np.repeat(np.arange(len(broken)), 1 + broken)
+    seconds = np.flatnonzero(broken) + np.arange(1, 1 + broken.sum())
     found = nodes[:, step].copy()
-    found[:, place[broken]] = first
-    found[:, place[broken] + counts[broken] - 1] = second
+    found[:, seconds - 1], found[:, seconds] = first, second
     ends = path.mesh[step]
-    halves = place[broken][fits] + 1
-    at = np.flatnonzero(broken)[fits]
-    ends[halves] += MEETINGS[best[fits]] * np.diff(path.mesh)[at]
+    ends[seconds] += MEETINGS[best] * np.diff(path.mesh)[broken]
     return Flown(np.append(ends, path.mesh[-1]), found, broken)
+
+
+def _share_within(dynamics: Dynamics, mean: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """The largest part of `apart`, at most 1, by which controls can leave their mean within the limit.
+
+    Shape of `apart` (2, meetings, steps, size), of the result (meetings, steps). Limits are convex, so that
+    bisection finds it.
+    """
+    allowed = BREAKS * (dynamics.actuator.force_limit() or 0.0)
+
+    def within(share: np.ndarray) -> np.ndarray:
+        return _beyond(dynamics, mean + share[..., None] * apart).max(axis=0) <= allowed
+
+    low, high = np.zeros(apart.shape[1:3]), np.ones(apart.shape[1:3])
+    whole = within(high)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        inside = within(middle)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return np.where(whole, 1.0, low)

@@ -45,7 +45,7 @@ DUAL_UNITS = {
 # How the control goes on from one node to the next.
 BETWEEN = (
     "; within a step the polynomial through its nodes or, where that breaks a limit, two constant pieces of "
-    "the same impulse and first moment, or the weighted mean"
+    "the same impulse and as much of its first moment as the limit allows"
 )
 
 

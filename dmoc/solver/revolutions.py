@@ -34,10 +34,9 @@ def best_revolutions(ladder: Ladder, hold: bool = False) -> Rung | None:
     problem, rounded = ladder.problem, ladder.problem.actuator.smoothing is not None
     best: Rung | None = None
     for duration in durations:
-        fixed = replace(problem, duration=float(duration))
-        coarse = starting_guess(fixed, uniform_mesh(COARSEST_NODES[True]), 2, hold)
-        steps = max(COARSEST_NODES[True], least_steps(fixed, coarse))
-        guess = starting_guess(fixed, uniform_mesh(steps), 2, hold)
+        coarse = starting_guess(problem, uniform_mesh(COARSEST_NODES[True]), 2, hold, duration=duration)
+        steps = max(COARSEST_NODES[True], least_steps(problem, coarse))
+        guess = starting_guess(problem, uniform_mesh(steps), 2, hold, duration=duration)
         rung = ladder.try_on(guess, WIDEST_ROUNDING if rounded else None, MOST_ITERATIONS)
         if rung.stopped:
             return best
@@ -47,21 +46,21 @@ def best_revolutions(ladder: Ladder, hold: bool = False) -> Rung | None:
     return best
 
 
-def _durations(ladder: Ladder) -> np.ndarray:
+def _durations(ladder: Ladder) -> list[float]:
     """Durations to try [s]; none where there is no choice."""
     problem, attraction = ladder.problem, ladder.problem.attraction
     anchored = problem.start.anchored and problem.goal.anchored
     if not problem.free_duration or problem.guess is not None or attraction.lone is None or not anchored:
-        return np.empty(0)
+        return []
     shortest, longest = problem.duration_bounds
     ends = [end.estimate(problem.start_time)[0] for end in (problem.start, problem.goal)]
     if not np.isfinite(ends).all():
-        return np.empty(0)
+        return []
     revolutions = (longest - shortest) * attraction.rates(np.array(ends)).max() / (2 * np.pi)
     if revolutions < NO_CHOICE:
-        return np.empty(0)
+        return []
     count = int(np.clip(np.ceil(revolutions / SPACING) + 1, 2, MOST_TRIED))
-    return np.linspace(shortest, longest, count)
+    return np.linspace(shortest, longest, count).tolist()
 
 
 def without_multipliers(path: DiscretePath) -> DiscretePath:

@@ -72,14 +72,20 @@ def test_a_control_without_a_moment_is_held_at_its_mean():
     assert known.nodes[:, :, 0] == pytest.approx(scheme(8).weights @ controls[:, 0])
 
 
-def test_where_two_pieces_do_not_fit_the_mean_is_held():
+def test_of_a_moment_that_no_pieces_have_within_the_limit_the_most_is_kept():
     rule = scheme(8)
     matrix = np.vstack([rule.weights, rule.weights * (rule.points - 0.5)])
     # With so large a moment about a mean so near the limit any two pieces would exceed it.
     values = np.linalg.lstsq(matrix, np.array([0.95, 0.2]), rcond=None)[0]
     problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
     known = flown(Dynamics.of(problem), path_with(8, np.column_stack([values, np.zeros(5)])))
-    assert len(known.mesh) == 2 and known.nodes[:, 0, 0] == pytest.approx(0.95)
+    first, second = known.nodes[0, :, 0]
+    lengths = np.diff(known.mesh)
+    assert np.dot(lengths, [first, second]) == pytest.approx(0.95, abs=1e-12)
+    # The largest moment of such a mean is that of -1 up to 0.025 and +1 from there on.
+    moment = (second - first) * lengths.prod() / 2
+    assert 0.95 * 0.025 * 0.975 < moment < 0.025 * 0.975 * (1 + 10 * BREAKS)
+    assert -1 - 2 * BREAKS < first and second < 1 + 2 * BREAKS
 
 
 @pytest.mark.parametrize("order, tol", [(8, None), (4, 1e-4)])

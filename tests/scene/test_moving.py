@@ -82,10 +82,7 @@ def test_a_start_may_move_too():
     assert solution.path.start_velocity[0] == pytest.approx(2.0, rel=1e-10)
 
 
-LOCAL = pytest.mark.xfail(strict=True, reason="a local optimum, 15.8 instead of 6.23")
-
-
-@pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, pytest.param(3.0, marks=LOCAL), 4.0, 5.0])
+@pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 def test_rendezvous_with_a_circling_target_in_the_least_time(phase):
     """The body arrives on the target, at full thrust all the way, from the default guess."""
     rate = 1.5**-1.5
@@ -104,6 +101,7 @@ def test_rendezvous_with_a_circling_target_in_the_least_time(phase):
     np.testing.assert_allclose(solution.position[-1], place, rtol=0, atol=1e-8)
     np.testing.assert_allclose(solution.path.goal_velocity, speed, rtol=0, atol=1e-8)
     full = np.linalg.norm(solution.force, axis=1) > 0.0999
+    assert solution.duration < 10, "one revolution more takes 15.8 s where 6.23 s is enough"
     assert full.mean() > 0.98, "the thrust may turn round in a node or two, and is full elsewhere"
     report = verify(solution)
     assert report["reference"].ok and report["optimality"].ok
