@@ -4,7 +4,8 @@ The control of a step is the polynomial through its Lobatto nodes: its integral 
 equations. Where the polynomial breaks the actuator's limit, as it does where the control switches inside the
 step, two constant pieces of the same impulse are flown there, within the limit. Of all such pieces, those keep
 the most of the control's first moment about the middle of the step. The limits are convex sets: the mean of the
-node values with the scheme's weights, which keeps none of it, obeys them. No impulse is flown that is not paid for.
+node values with the scheme's weights, which keeps none of it, obeys them. No impulse is flown that is not
+paid for.
 """
 
 from __future__ import annotations
