@@ -38,6 +38,8 @@ INNER_MASSES = "mass_inside"
 COSTATE = Key("smooth", "row", "dynamics")
 # The multipliers of an actuator's rows have this key, such as those that tie a throttle to the force.
 ACTUATOR_ROWS = Key("control", "row", "actuator")
+# The multiplier of the limits on a free duration has this key: the derivative of the objective by it.
+DURATION = Key("end", "column", "duration")
 # The multipliers of the bounds on positions have this key, such as those of a box to stay in.
 POSITION_BOUNDS = Key("node", "column", "position")
 

@@ -49,6 +49,7 @@ STATUSES = {
         ("Diverging_Iterates",), "the objective has no lower bound here; limit the force or the duration"
     ),
     "stopped": Status(("User_Requested_Stop",), "interrupted; the best iterate is kept"),
+    "time limit": Status((), "give more time, fewer steps or a looser tolerance; the answer is kept as it is"),
     "tolerance not met": Status(
         (), "give steps to begin with, another order, or a looser tolerance; the answer is kept as it is"
     ),
@@ -128,11 +129,25 @@ def run(solver: ca.Function, **given: np.ndarray) -> Answer:
 
 
 class Interrupt:
-    """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate be lost."""
+    """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate be lost.
 
-    def __init__(self) -> None:
-        self.seen = False
+    It is set as well once so many `seconds` are over.
+    """
+
+    def __init__(self, seconds: float | None = None) -> None:
+        self.seconds, self._begun = seconds, time.monotonic()
+        self._pressed = False
         self._previous: Any = None
+
+    @property
+    def late(self) -> bool:
+        """Whether the time is over."""
+        return self.seconds is not None and time.monotonic() - self._begun > self.seconds
+
+    @property
+    def seen(self) -> bool:
+        """Whether the run is to end."""
+        return self._pressed or self.late
 
     def __enter__(self) -> Interrupt:
         # Python lets no other thread handle signals.
@@ -145,7 +160,7 @@ class Interrupt:
             signal.signal(signal.SIGINT, self._previous)
 
     def _see(self, *received: Any) -> None:
-        self.seen = True
+        self._pressed = True
 
 
 class Watch(ca.Callback):

@@ -65,8 +65,10 @@ def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, A
         # With |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations.
         settings: dict[str, Any] = {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
         # Near the optimum full steps can go to and fro, 2,700 times in one case, each for hardly less violation
-        # of the rows: a larger gamma_theta accepts a step only for clearly less.
-        return settings | ({"ipopt.gamma_theta": 1e-2} if warm else {})
+        # of the rows: a larger gamma_theta accepts a step only for clearly less. Between paths that cost almost
+        # the same the adaptive barrier falls far too soon; held to no decrease, it rises again.
+        held = {"ipopt.gamma_theta": 1e-2, "ipopt.adaptive_mu_globalization": "never-monotone-mode"}
+        return settings | (held if warm else {})
     if problem.limited and not rounded and warm and not carried:
         # After a change of the start or of a limit this takes 78 iterations instead of 143, over eleven changes
         # of four problems. After a change of the mesh or of the rounding of |F| it would take up to 13 times as

@@ -59,9 +59,17 @@ class NLP(Program):
         sizes = self.columns.size, self.rows.size, self.assembly.p.numel()
         return Watch(*sizes, tell if progress else None, interrupt)
 
-    def run(self, solver: ca.Function, problem: TransferProblem, path: DiscretePath) -> Answer:
-        """Solve for a problem that `accepts` lets through, from a path on this mesh."""
+    def run(
+        self, solver: ca.Function, problem: TransferProblem, path: DiscretePath, pinned: bool = False
+    ) -> Answer:
+        """Solve for a problem that `accepts` lets through, from a path on this mesh.
+
+        `pinned` keeps the duration of the path where it is free.
+        """
         lbx, ubx, lbg, ubg = self.bounds(problem)
+        if pinned:
+            place = self.columns["duration"].start
+            lbx[place] = ubx[place] = self.pack(path)[place]
         lam_x, lam_g = self.multipliers(path)
         bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
         x0 = np.clip(self.pack(path), lbx, ubx)

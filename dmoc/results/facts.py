@@ -10,7 +10,11 @@ from dmoc.scene.problem import TransferProblem
 
 @dataclass(frozen=True)
 class Level:
-    """One rung of the ladder from coarse to fine."""
+    """One rung of the ladder from coarse to fine.
+
+    `question` says what was asked there if it was not the problem itself, such as "least effort in 12 s"; its
+    objective is then that of the question.
+    """
 
     order: int
     steps: int
@@ -21,6 +25,7 @@ class Level:
     status: str
     error: float | None = None
     evaluations: int = 0
+    question: str = ""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from dmoc.scene.problem import TransferProblem
 
 # Status of a local optimum that is not as accurate as it was asked to be.
 NOT_MET = "tolerance not met"
+# Status of a local optimum on a mesh before the last one, when the time was over.
+OUT_OF_TIME = "time limit"
 
 
 class SolveError(RuntimeError):
@@ -48,6 +50,8 @@ class Solution:
         The meshes on the way, coarse to fine.
     worst : tuple of (str, float, str)
         The worst violated rows and bounds of a failed solve, worst first: name, size and unit.
+    warnings : tuple of str
+        What a user should know of an answer that is right: a duration that ends on its limit, say.
     tolerance, error, reason
         The accuracy that was asked for, the estimated errors, and the reason for this mesh; empty without a
         tolerance.
@@ -65,6 +69,7 @@ class Solution:
     message: str
     ladder: tuple[Level, ...]
     worst: tuple[tuple[str, float, str], ...] = ()
+    warnings: tuple[str, ...] = ()
     tolerance: float | None = None
     error: Error | None = None
     reason: str = ""
@@ -73,7 +78,7 @@ class Solution:
     @property
     def optimal(self) -> bool:
         """Whether the path is a local optimum, be it as accurate as asked for or not."""
-        return self.success or self.status == NOT_MET
+        return self.success or self.status in (NOT_MET, OUT_OF_TIME)
 
     @property
     def order(self) -> int:

@@ -113,6 +113,8 @@ def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
         str(facts["message"]),
         tuple(Level(**level) for level in json.loads(facts["ladder"])),
         tuple((str(name), float(size), str(unit)) for name, size, unit in json.loads(facts["worst"])),
+        # Files that were written before there were warnings have none.
+        warnings=tuple(map(str, json.loads(facts.get("warnings", "[]")))),
         tolerance=json.loads(facts["tolerance"]),
         error=Error(**error) if (error := json.loads(facts["error"])) else None,
         reason=str(facts["reason"]),
@@ -172,6 +174,7 @@ def _attributes(solution: Any) -> dict[str, Any]:
         "control_units": about.control_units,
         "ladder": [asdict(level) for level in solution.ladder],
         "worst": solution.worst,
+        "warnings": solution.warnings,
         "tolerance": solution.tolerance,
         "error": asdict(solution.error) if solution.error else None,
     }

@@ -11,14 +11,14 @@ import numpy as np
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube, out_of_tube
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.motion.stability import refuse_unstable
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt
 from dmoc.nlp.solving import NLP, Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
-from dmoc.results.solution import Solution
+from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.cause import Cause, cause_of
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
@@ -34,13 +34,27 @@ LEAST_HALVED = 9
 # Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
 # the first one may have been too short.
 LONGER = 10
+# An attempt that is one of several ways to an answer ends after this many iterations: those that get there take
+# 20 to 130, and what takes longer wanders.
+MOST_TRYING = 150
+# A refinement of a mesh ends after this many iterations, and then each other way to it after the number above.
+MOST_REFINING = 300
+# Durations are equally good if, to first order, a change by this part of the duration costs no more than the
+# tolerance.
+EQUALLY_GOOD = 0.1
+# On the way to a path that a wide rounding of |F| would find sooner, |F| is first rounded this many times as
+# wide.
+WIDER = 10.0
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure."""
+    """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure.
+
+    `pinned` says that it kept the duration of its guess, free as that is.
+    """
 
     number: int
     problem: TransferProblem
@@ -48,6 +62,7 @@ class Rung:
     answer: Answer
     level: Level
     cause: Cause | None = None
+    pinned: bool = False
 
     @property
     def solved(self) -> bool:
@@ -73,10 +88,11 @@ class Ladder:
         options: dict[str, Any] | None = None,
         progress: Progress | None = None,
         compiled: bool = False,
+        time_limit: float | None = None,
     ):
         self.problem, self.options, self.progress, self.compiled = problem, options, progress, compiled
         self.dynamics = Dynamics.of(problem)
-        self.interrupt = Interrupt()
+        self.interrupt = Interrupt(time_limit)
         self._rungs: list[Rung] = []
 
     @property
@@ -144,9 +160,46 @@ class Ladder:
         cause = cause_of(self._rounded(rounding), start)
         return replace(rung, cause=cause) if cause.path is None else self.solve_on(cause.path, rounding)
 
-    def try_on(self, guess: DiscretePath, rounding: float | None, most: int) -> Rung:
+    def try_on(self, guess: DiscretePath, rounding: float | None = None, most: int = MOST_TRYING) -> Rung:
         """One attempt of at most so many iterations, to see where a guess leads."""
         return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most})
+
+    def ask(self, problem: TransferProblem, guess: DiscretePath, question: str) -> Rung:
+        """One attempt of few iterations at another problem, whose answer helps; `question` says what it is."""
+        return self._attempt(guess, problem, {"ipopt.max_iter": MOST_TRYING}, question=question)
+
+    def refine_on(self, guess: DiscretePath, tol: float, pinned: bool = False) -> Rung:
+        """Solve on a finer mesh from the answer on a coarser one, in a few hundred iterations or not at all.
+
+        Where equally good paths differ in their duration Ipopt wanders from one to the other: what fails is
+        tried again with the duration `pinned` to that of the coarser mesh, which then has to be as good as any
+        other to the tolerance, and with a wider rounding of |F| on the way. Pinned from the outset, the free
+        duration comes last.
+        """
+        rounding = self.problem.actuator.smoothing
+        wider = [] if rounding is None else [WIDER * rounding]
+        free: list[tuple[bool, list]] = [(False, [None])]
+        ways = (
+            [(True, [None]), (True, [*wider, None])]
+            if self.problem.free_duration
+            else [(False, [*wider, None])]
+        )
+        for pin, widths in ways + free if pinned else free + ways:
+            start = guess
+            for width in widths:
+                most = MOST_TRYING if pin or width else MOST_REFINING
+                limits = {"ipopt.max_iter": most}
+                rung = self._attempt(start, self._rounded(width), limits, pinned=pin)
+                start = rung.path if rung.solved else start
+            if rung.stopped or (rung.solved and (not pin or self._as_good(rung, tol))):
+                return rung
+        return replace(rung, answer=replace(rung.answer, status="failed"))
+
+    def _as_good(self, rung: Rung, tol: float) -> bool:
+        """Whether no other duration costs less than that of an answer, to first order."""
+        slope = np.abs(rung.path.multipliers[DURATION]).max()
+        cost = max(abs(rung.level.objective), np.finfo(float).tiny)
+        return bool(EQUALLY_GOOD * slope * rung.path.duration <= tol * cost)
 
     def solve_on(self, guess: DiscretePath, rounding: float | None = None) -> Rung:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
@@ -162,7 +215,12 @@ class Ladder:
         return self._attempt(guess, problem)
 
     def _attempt(
-        self, guess: DiscretePath, problem: TransferProblem, limits: dict[str, Any] | None = None
+        self,
+        guess: DiscretePath,
+        problem: TransferProblem,
+        limits: dict[str, Any] | None = None,
+        question: str = "",
+        pinned: bool = False,
     ) -> Rung:
         last = self._rungs[-1] if self._rungs else None
         if last is not None and self.interrupt.seen:
@@ -176,11 +234,12 @@ class Ladder:
         watch = nlp.watch(problem, self.progress, self.interrupt)
         solver = nlp.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
         built = time.perf_counter() - begun
-        answer = nlp.run(solver, problem, guess)
+        answer = nlp.run(solver, problem, guess, pinned)
         if watch.error is not None:
             raise watch.error
-        level = nlp.level(answer, built)
-        self._rungs.append(Rung(len(self._rungs), self._asked(problem), nlp, answer, level))
+        level = replace(nlp.level(answer, built), question=question)
+        asked = problem if question else self._asked(problem)
+        self._rungs.append(Rung(len(self._rungs), asked, nlp, answer, level, pinned=pinned))
         return self._rungs[-1]
 
     def _asked(self, problem: TransferProblem) -> TransferProblem:
@@ -197,10 +256,27 @@ class Ladder:
         return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
     def solution(self, rung: Rung, errors: dict[int, float] | None = None, **found: Any) -> Solution:
-        """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung."""
+        """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung.
+
+        If the time was over there, the answer is that of the last mesh that was solved.
+        """
+        if rung.stopped and self.interrupt.late:
+            return self._out_of_time(rung, errors, **found)
         known = errors or {}
         levels = tuple(replace(one.level, error=known.get(one.number)) for one in self._rungs)
         reason = "" if rung.cause is None else rung.cause.words()
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, worst=worst, **found)
+
+    def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
+        """The best that there is when the time is over: the last answer to the problem, or the last iterate."""
+        answers = [one for one in self._rungs if one.solved and not one.level.question]
+        best = answers[-1] if answers else replace(rung, answer=replace(rung.answer, status="failed"))
+        over = f"the time limit of {self.interrupt.seconds:g} s ended it"
+        solution = self.solution(best, errors, **found)
+        if not answers:
+            return replace(solution, message=f"{over} before any mesh was solved: give more time")
+        where = f"order {solution.order}, {solution.steps} steps"
+        told = f"{over}; this is the answer on the last mesh that was solved ({where})"
+        return replace(solution, success=False, status=OUT_OF_TIME, message=told)

@@ -80,6 +80,7 @@ class _Refinement:
         self.best: _Found | None = None
         self.worse = 0
         self.rounded = 0.0
+        self.flat = False
 
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
@@ -87,13 +88,18 @@ class _Refinement:
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
-            rung = self.ladder.solve_on(coarse.onto(_cut(coarse.mesh, parts), order, hold))
+            rung = self.ladder.refine_on(
+                coarse.onto(_cut(coarse.mesh, parts), order, hold), self.tol, self.flat
+            )
             if not rung.solved:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
-                return self._settled(f"{self.reason}; a finer mesh was not solved")
+                return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
             fine = rung.path
             self.changes.append(change((coarse, cost), (fine, rung.level.objective), parts))
+            if rung.pinned and not self.flat:
+                self.flat = True
+                self.reason += "; durations cost the same, one was kept"
             met = self._judge(rung, fine, most)
             if met:
                 self._sharpen(rung, most)
