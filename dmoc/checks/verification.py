@@ -258,10 +258,8 @@ def _bounds(evidence: Evidence) -> Check:
     """The limit whose excess is the largest part of the excess that is allowed."""
     worst = max(excesses(evidence), key=lambda limit: limit.share)
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
-    shortest, longest = evidence.problem.duration_bounds
-    below, above = evidence.path.duration - shortest, longest - evidence.path.duration
-    if evidence.problem.free_duration and min(below, above) < 1e-6 * longest:
-        bound = "shortest" if below < above else "longest"
+    bound = evidence.problem.limit_of_duration(evidence.path.duration)
+    if bound is not None:
         note += f"; the duration sits on its {bound} limit of {evidence.path.duration:g} s"
     return Check.of("bounds", worst.value, worst.allowed, worst.unit, note)
 

@@ -47,6 +47,10 @@ def solve(
             metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
         ),
     ] = 1,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
+    ] = None,
     as_json: Json = False,
     compiled: Annotated[
         bool,
@@ -67,9 +71,8 @@ def solve(
         if starts > 1:
             start = best_start(problem, starts, order, hold, start, None if as_json or quiet else unit)
         with watched(as_json or quiet, unit) as progress:
-            solution = dmoc.solve(
-                problem, order, steps, tol, hold, guess=start, progress=progress, compiled=compiled
-            )
+            numerics = order, steps, tol, hold, None, start, None
+            solution = dmoc.solve(problem, *numerics, progress, compiled, time_limit)
         from dmoc.checks.verification import verify
 
         verdict = verify(solution) if solution.optimal else None

@@ -80,9 +80,7 @@ def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
     From a path that meets its equations Ipopt finds multipliers near the right ones, by least squares.
     """
     n, rule = problem.dimension, scheme(guess.order)
-    # Only where the controls are the force, or the force and its magnitude, do the equations give them.
-    more = problem.actuator.labels(n)[n:]
-    if guess.control.shape[1] < n or more not in ((), ("throttle",)):
+    if controls_for(problem, np.zeros((1, n))) is None:
         return guess.control
     dynamics, begin = Dynamics.of(problem), problem.start_time
     at, rows = step_nodes(len(guess.mesh) - 1, rule), np.zeros_like(guess.position)
@@ -95,8 +93,21 @@ def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
         force = np.einsum("j,jkn->kn", rule.weights, force[at])
     thrust, limit = np.linalg.norm(force, axis=1, keepdims=True), problem.actuator.force_limit()
     # All forces are scaled down together until the largest keeps the limit: the path in between stays smooth.
-    control = np.hstack([force, thrust]) if more else force
+    control = controls_for(problem, force)
+    assert control is not None
     return control if limit is None else control * min(1.0, limit / (thrust.max() or limit))
+
+
+def controls_for(problem: TransferProblem, force: np.ndarray) -> np.ndarray | None:
+    """The controls with which the actuator gives a force of shape (count, axes) [N].
+
+    None unless the controls are the force, or the force and its magnitude.
+    """
+    n = problem.dimension
+    more = problem.actuator.labels(n)[n:]
+    if problem.controls < n or more not in ((), ("throttle",)):
+        return None
+    return np.hstack([force, np.linalg.norm(force, axis=1, keepdims=True)]) if more else force
 
 
 def guess_duration(problem: TransferProblem) -> float:

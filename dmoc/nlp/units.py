@@ -55,11 +55,11 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
     force = force or typical
-    cost = max(abs(_cost(problem, guess, 0.0)), abs(_cost(problem, guess, force))) or 1.0
+    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, force))) or 1.0
     return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
 
 
-def _cost(problem: TransferProblem, guess: DiscretePath, force: float) -> float:
+def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0) -> float:
     """About the objective along a guess, with `force` [N] in place of its controls if that is not zero."""
     parts = problem.dimension, problem.objective, problem.actuator
     rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)

@@ -19,6 +19,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
         "problem": solution.require_problem().name,
         "success": bool(solution.success),
         "status": solution.status,
+        "warnings": list(solution.warnings),
         "objective": float(solution.objective),
         "duration": float(solution.duration),
         "final_mass": float(solution.final_mass),

@@ -116,14 +116,20 @@ def ladder(solution: Solution) -> RenderableType:
     table = plain_table(
         ["order", "steps", "iterations", objective, "build [s]", "solve [s]", "status"], numbers=slice(6)
     )
+    asked = any(level.question for level in solution.ladder)
+    if asked:
+        table.add_column("what was asked")
     estimated = any(level.error is not None for level in solution.ladder)
     if estimated:
         table.add_column("error [-]")
     for level in solution.ladder:
         row = [str(number) for number in (level.order, level.steps, level.iterations)]
-        row += [f"{level.objective:.8g}", f"{level.build_s:.2f}", f"{level.solve_s:.2f}"]
+        # The objective of another question has another unit, and would be read as one of the problem.
+        cost = "" if level.question else f"{level.objective:.8g}"
+        row += [cost, f"{level.build_s:.2f}", f"{level.solve_s:.2f}", level.status]
+        row += [level.question] * asked
         error = "" if level.error is None else f"{level.error:.1e}"
-        table.add_row(*row, level.status, *([error] if estimated else []))
+        table.add_row(*row, *([error] if estimated else []))
     # on a narrow terminal the headers are broken into lines, not the numbers
     for column in table.columns:
         column.min_width = max((len(str(cell)) for cell in column.cells), default=0)
@@ -153,8 +159,10 @@ def answer(
     well = solution.success and not broken
     last = Text(found, "green" if well else "yellow")
     if not solution.success:
-        last.append(f"Not to the tolerance: {solution.message}. ")
+        last.append(f"{solution.status.capitalize()}: {solution.message}. ")
     last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
+    for warning in solution.warnings:
+        last.append(f" Note that {warning}.", "yellow")
     if quiet:
         return last
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()

@@ -21,6 +21,10 @@ from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
 
+# A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
+# the solver keeps it that far away.
+SITS_ON = 1e-6
+
 
 @dataclass(frozen=True)
 class TransferProblem:
@@ -136,6 +140,14 @@ class TransferProblem:
     def free_duration(self) -> bool:
         """Whether the duration is found by the optimisation."""
         return isinstance(self.duration, tuple)
+
+    def limit_of_duration(self, duration: float) -> str | None:
+        """Which limit of a free duration a duration [s] sits on: "shortest", "longest" or None."""
+        shortest, longest = self.duration_bounds
+        below, above = duration - shortest, longest - duration
+        if not self.free_duration or min(below, above) > SITS_ON * longest:
+            return None
+        return "shortest" if below < above else "longest"
 
     @property
     def duration_bounds(self) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,18 @@ import numpy as np
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube, out_of_tube
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.path import DURATION, DiscretePath
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
-from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt
-from dmoc.nlp.solving import NLP, Progress
+from dmoc.nlp.ipopt import STATUSES, Interrupt
+from dmoc.nlp.solving import Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
-from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.cause import Cause, cause_of
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
+from dmoc.solver.rung import Rung
 
 # The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: the error of the
 # mesh is far smaller, so a finer one cannot help.
@@ -39,44 +39,11 @@ LONGER = 10
 MOST_TRYING = 150
 # A refinement of a mesh ends after this many iterations, and then each other way to it after the number above.
 MOST_REFINING = 300
-# Durations are equally good if, to first order, a change by this part of the duration costs no more than the
-# tolerance.
-EQUALLY_GOOD = 0.1
 # On the way to a path that a wide rounding of |F| would find sooner, |F| is first rounded this many times as
 # wide.
 WIDER = 10.0
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure.
-
-    `pinned` says that it kept the duration of its guess, free as that is.
-    """
-
-    number: int
-    problem: TransferProblem
-    nlp: NLP
-    answer: Answer
-    level: Level
-    cause: Cause | None = None
-    pinned: bool = False
-
-    @property
-    def solved(self) -> bool:
-        return self.answer.status == "solved"
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the user ended it."""
-        return self.answer.status == "stopped"
-
-    @property
-    def path(self) -> DiscretePath:
-        """The path of the answer, with its multipliers."""
-        return self.nlp.path(self.problem, self.answer)
 
 
 class Ladder:
@@ -160,46 +127,42 @@ class Ladder:
         cause = cause_of(self._rounded(rounding), start)
         return replace(rung, cause=cause) if cause.path is None else self.solve_on(cause.path, rounding)
 
-    def try_on(self, guess: DiscretePath, rounding: float | None = None, most: int = MOST_TRYING) -> Rung:
-        """One attempt of at most so many iterations, to see where a guess leads."""
-        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most})
+    def try_on(
+        self,
+        guess: DiscretePath,
+        rounding: float | None = None,
+        most: int = MOST_TRYING,
+        pinned: bool = False,
+    ) -> Rung:
+        """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration."""
+        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most}, pinned=pinned)
 
     def ask(self, problem: TransferProblem, guess: DiscretePath, question: str) -> Rung:
         """One attempt of few iterations at another problem, whose answer helps; `question` says what it is."""
         return self._attempt(guess, problem, {"ipopt.max_iter": MOST_TRYING}, question=question)
 
-    def refine_on(self, guess: DiscretePath, tol: float, pinned: bool = False) -> Rung:
+    def refine_on(self, guess: DiscretePath, pinned: bool = False) -> Rung:
         """Solve on a finer mesh from the answer on a coarser one, in a few hundred iterations or not at all.
 
         Where equally good paths differ in their duration Ipopt wanders from one to the other: what fails is
-        tried again with the duration `pinned` to that of the coarser mesh, which then has to be as good as any
-        other to the tolerance, and with a wider rounding of |F| on the way. Pinned from the outset, the free
-        duration comes last.
+        tried again with the duration `pinned` to that of the coarser mesh, and with a wider rounding of |F| on
+        the way. Pinned from the outset, the free duration comes last.
         """
         rounding = self.problem.actuator.smoothing
-        wider = [] if rounding is None else [WIDER * rounding]
-        free: list[tuple[bool, list]] = [(False, [None])]
-        ways = (
-            [(True, [None]), (True, [*wider, None])]
-            if self.problem.free_duration
-            else [(False, [*wider, None])]
-        )
+        by_way: list[float | None] = [None] if rounding is None else [WIDER * rounding, None]
+        free: list[tuple[bool, list[float | None]]] = [(False, [None])]
+        ways: list[tuple[bool, list[float | None]]] = [(True, [None]), (True, by_way)]
+        if not self.problem.free_duration:
+            ways = [(False, by_way)]
         for pin, widths in ways + free if pinned else free + ways:
             start = guess
             for width in widths:
                 most = MOST_TRYING if pin or width else MOST_REFINING
-                limits = {"ipopt.max_iter": most}
-                rung = self._attempt(start, self._rounded(width), limits, pinned=pin)
+                rung = self.try_on(start, width, most, pin)
                 start = rung.path if rung.solved else start
-            if rung.stopped or (rung.solved and (not pin or self._as_good(rung, tol))):
-                return rung
-        return replace(rung, answer=replace(rung.answer, status="failed"))
-
-    def _as_good(self, rung: Rung, tol: float) -> bool:
-        """Whether no other duration costs less than that of an answer, to first order."""
-        slope = np.abs(rung.path.multipliers[DURATION]).max()
-        cost = max(abs(rung.level.objective), np.finfo(float).tiny)
-        return bool(EQUALLY_GOOD * slope * rung.path.duration <= tol * cost)
+            if rung.stopped or rung.solved:
+                break
+        return rung
 
     def solve_on(self, guess: DiscretePath, rounding: float | None = None) -> Rung:
         """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
@@ -222,8 +185,9 @@ class Ladder:
         question: str = "",
         pinned: bool = False,
     ) -> Rung:
-        last = self._rungs[-1] if self._rungs else None
-        if last is not None and self.interrupt.seen:
+        answers = [one for one in self._rungs if not one.level.question]
+        last = answers[-1] if answers else None
+        if last is not None and not question and self.interrupt.seen:
             return replace(last, answer=replace(last.answer, status="stopped"))
         begun = time.perf_counter()
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
@@ -267,7 +231,8 @@ class Ladder:
         reason = "" if rung.cause is None else rung.cause.words()
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
-        return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, worst=worst, **found)
+        more = {"worst": worst, "warnings": rung.warnings(), **found}
+        return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
 
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""

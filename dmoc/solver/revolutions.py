@@ -2,67 +2,143 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
-from dmoc.guess.starting import starting_guess
-from dmoc.motion.mesh import uniform_mesh
+from dmoc.guess.open_ends import end_estimates
+from dmoc.guess.starting import controls_for, starting_guess
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.solver.ladder import Ladder, Rung
-from dmoc.solver.meshes import COARSEST_NODES, WIDEST_ROUNDING, least_steps
+from dmoc.nlp.units import cost_along
+from dmoc.parts.forces import FreeForce
+from dmoc.parts.objectives import Effort
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.meshes import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
+from dmoc.solver.rung import Rung
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.
 SPACING = 0.5
 # At most this many durations are tried.
-MOST_TRIED = 12
-# A try that takes more iterations than this leads nowhere near: others take 15 to 100.
-MOST_ITERATIONS = 150
+MOST_TRIED = 16
 # Where the durations that are allowed differ by less than this, in revolutions, there is nothing to choose.
-NO_CHOICE = 0.75
+NO_CHOICE = 0.1
+# The least effort of a duration is found on at least this many steps of order 6, and on at most five times as
+# many.
+SOUNDING_STEPS = 20
+# The problem itself is solved on a coarse mesh from this many of the durations, the most promising ones.
+MOST_SOLVED = 3
 
 
-def best_revolutions(ladder: Ladder, hold: bool = False) -> Rung | None:
-    """The best answer on a coarse mesh, from guesses of different durations and so of different revolutions.
+@dataclass(frozen=True)
+class _Sounding:
+    """The path of least effort for one duration, and what it promises for the problem itself.
 
-    None where there is no choice: the duration is fixed, nothing attracts alone, an end leaves its place
-    open, or less than a revolution lies between the shortest and the longest duration.
+    `excess` is by how much its force in the mean square exceeds the limit [N]. As no force moves the body in
+    that time with less in the mean square, a transfer cannot be flown if that is above the limit. `cost` is
+    about the objective of the problem along the path, with the sign of a minimum. `pinned` says that the
+    problem is to be solved with this duration first; where force costs nothing, the duration is all there is.
     """
-    durations = _durations(ladder)
-    if len(durations) < 2:
+
+    path: DiscretePath
+    excess: float
+    cost: float
+    pinned: bool = True
+
+
+def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | None:
+    """The best answer on a coarse mesh, from paths of different durations and so of different revolutions.
+
+    For each duration the path of least effort without a limit of the force is found, which takes a few
+    iterations. The problem itself is solved from those that promise most, first with their durations, then
+    with that of the best one freed. None where there is no choice: the duration is fixed, nothing attracts
+    alone, an end leaves all open, or the shortest and the longest duration hardly differ.
+    """
+    problem = ladder.problem
+    soundings = [found for duration in _durations(problem) if (found := _sounding(ladder, duration))]
+    if len(soundings) < 2:
         return None
-    problem, rounded = ladder.problem, ladder.problem.actuator.smoothing is not None
+    soundings.sort(key=lambda one: (one.excess, one.cost))
+    order = order or (2 if hold else ORDER_OF_MANY_TURNS)
     best: Rung | None = None
-    for duration in durations:
-        coarse = starting_guess(problem, uniform_mesh(COARSEST_NODES[True]), 2, hold, duration=duration)
-        steps = max(COARSEST_NODES[True], least_steps(problem, coarse))
-        guess = starting_guess(problem, uniform_mesh(steps), 2, hold, duration=duration)
-        rung = ladder.try_on(guess, WIDEST_ROUNDING if rounded else None, MOST_ITERATIONS)
-        if rung.stopped:
-            return best
-        sense = problem.objective.sense
-        if rung.solved and (best is None or sense * rung.level.objective < sense * best.level.objective):
+    for one in soundings[:MOST_SOLVED]:
+        # Least effort without a limit costs about as much as the answer to the problem, or more.
+        if best is not None and one.cost > _cost(best):
+            break
+        steps = max(COARSEST_NODES[True] // (order // 2), least_steps(problem, one.path))
+        rung = _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
+        if rung.solved and (best is None or _cost(rung) < _cost(best)):
             best = rung
-    return best
+    if best is None or not best.pinned:
+        return best
+    freed = ladder.try_on(best.path)
+    return freed if freed.solved else best
 
 
-def _durations(ladder: Ladder) -> list[float]:
+def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
+    """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
+    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+        rung = ladder.try_on(guess, width, pinned=pinned)
+        if not rung.solved:
+            break
+        guess = rung.path
+    return rung
+
+
+def _durations(problem: TransferProblem) -> list[float]:
     """Durations to try [s]; none where there is no choice."""
-    problem, attraction = ladder.problem, ladder.problem.attraction
-    anchored = problem.start.anchored and problem.goal.anchored
-    if not problem.free_duration or problem.guess is not None or attraction.lone is None or not anchored:
-        return []
     shortest, longest = problem.duration_bounds
-    ends = [end.estimate(problem.start_time)[0] for end in (problem.start, problem.goal)]
-    if not np.isfinite(ends).all():
+    if not problem.free_duration or problem.guess is not None or problem.attraction.lone is None:
         return []
-    revolutions = (longest - shortest) * attraction.rates(np.array(ends)).max() / (2 * np.pi)
+    places = np.array([position for position, _ in end_estimates(problem, shortest)])
+    if not np.isfinite(places).all():
+        return []
+    revolutions = (longest - shortest) * problem.attraction.rates(places).max() / (2 * np.pi)
     if revolutions < NO_CHOICE:
         return []
     count = int(np.clip(np.ceil(revolutions / SPACING) + 1, 2, MOST_TRIED))
     return np.linspace(shortest, longest, count).tolist()
 
 
-def without_multipliers(path: DiscretePath) -> DiscretePath:
-    """A path as a guess: those multipliers are of another mesh and of a wider rounding of |F|."""
-    return replace(path, multipliers={})
+def _sounding(ladder: Ladder, duration: float) -> _Sounding | None:
+    """The path of least effort in a duration; None where it was not found in a few iterations."""
+    problem = ladder.problem
+    free = replace(problem, duration=duration, actuator=FreeForce(), objective=Effort())
+    first = starting_guess(free, uniform_mesh(SOUNDING_STEPS), ORDER_OF_MANY_TURNS, False)
+    steps = int(np.clip(least_steps(free, first), SOUNDING_STEPS, 5 * SOUNDING_STEPS))
+    guess = starting_guess(free, uniform_mesh(steps), ORDER_OF_MANY_TURNS, False)
+    rung = ladder.ask(free, guess, f"least effort in {duration:g} s")
+    if not rung.solved:
+        return None
+    path = replace(rung.path, multipliers={})
+    weights = node_weights(path.mesh, scheme(path.order))
+    needed = float(np.sqrt(weights @ np.square(path.control).sum(axis=1)))
+    limit = problem.actuator.force_limit()
+    excess = 0.0 if limit is None else max(0.0, needed - limit)
+    control = controls_for(problem, path.control)
+    if control is None:
+        control = np.zeros((len(path.control), problem.controls))
+        return _Sounding(replace(path, control=control), excess, rung.level.objective)
+    flown = _with_mass(problem, replace(path, control=control))
+    cost = problem.objective.sense * cost_along(problem, flown)
+    pinned = cost_along(problem, replace(path, control=0 * control)) != cost_along(problem, flown)
+    most = np.abs(path.control).max() if limit is None else limit
+    within = control * min(1.0, most / np.linalg.norm(path.control, axis=1).max(initial=most))
+    return _Sounding(replace(path, control=within), excess, cost, pinned)
+
+
+def _with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
+    """The path with the mass that its controls leave, at least half of it."""
+    if not problem.actuator.burns:
+        return path
+    u = ca.SX.sym("u", problem.controls)
+    flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
+    burnt = path.duration * np.cumsum(node_weights(path.mesh, scheme(path.order)) * flow)
+    return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))
+
+
+def _cost(rung: Rung) -> float:
+    return rung.problem.objective.sense * rung.level.objective

@@ -10,8 +10,8 @@ from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import ORDER_OF_MANY_TURNS, first_path
-from dmoc.solver.revolutions import best_revolutions, without_multipliers
+from dmoc.solver.meshes import first_path
+from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.tolerance import climb_to_tolerance
 
 
@@ -26,6 +26,7 @@ def solve(
     options: dict[str, Any] | None = None,
     progress: Progress | None = None,
     compiled: bool = False,
+    time_limit: float | None = None,
 ) -> Solution:
     """Solve a transfer problem, coarse to fine.
 
@@ -56,6 +57,9 @@ def solve(
         Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
         once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with
         several effects and in repeated solves. Without a compiler nothing changes.
+    time_limit : float
+        Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
+        solved: its status is then "time limit", and it is no success.
 
     Returns
     -------
@@ -76,19 +80,23 @@ def solve(
         whole("steps", steps, least=2)
     if progress is not None and not callable(progress):
         raise ValueError(f"progress must be a function; got {short(progress)}")
-    ladder = Ladder(problem, options, progress, compiled)
+    if time_limit is not None:
+        number("time_limit", time_limit, "s", positive=True)
+    ladder = Ladder(problem, options, progress, compiled, time_limit)
     if tol is not None:
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
         tol = _tolerance(tol)
     with ladder.interrupt:
-        best = best_revolutions(ladder, hold) if guess is None and tol is None else None
+        best = best_revolutions(ladder, order, hold) if guess is None and mesh is None else None
         if best is not None:
-            guess = without_multipliers(best.path)
-            order = order or (2 if hold else ORDER_OF_MANY_TURNS)
+            guess = best.path
         if tol is not None:
             return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
+        order = order or (None if best is None else best.nlp.scheme.order)
         first = first_path(problem, order, steps, hold, guess, mesh)
+        if best is not None:
+            return ladder.solution(ladder.refine_on(first, best.pinned))
         return ladder.solution(ladder.climb_to(first, guess))
 
 

@@ -11,11 +11,12 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.facts import Error
 from dmoc.results.solution import NOT_MET, Solution
+from dmoc.results.switches import corners, is_singular, switch_times
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.estimate import TINY, change, estimate, local_errors, rounding_cost
-from dmoc.solver.ladder import Ladder, Rung
+from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.switches import corners, is_singular, switch_times
+from dmoc.solver.rung import Rung
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
@@ -33,6 +34,9 @@ MOST_SHARPENING = 200
 LEAST_ROUNDING = 1e-8
 # The times of switches are listed only if there are no more than this many: a message must stay short.
 MOST_SWITCHES = 12
+# Durations are equally good if, to first order, a change by this part of the duration costs no more than the
+# tolerance.
+EQUALLY_GOOD = 0.1
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
 
@@ -88,10 +92,8 @@ class _Refinement:
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
-            rung = self.ladder.refine_on(
-                coarse.onto(_cut(coarse.mesh, parts), order, hold), self.tol, self.flat
-            )
-            if not rung.solved:
+            rung = self.ladder.refine_on(coarse.onto(_cut(coarse.mesh, parts), order, hold), self.flat)
+            if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")

@@ -14,7 +14,7 @@ from dmoc.cli.app import main
 from dmoc.scene.problem_file import load_problem
 
 FIGURES = ("objective", "duration", "final_mass", "order", "steps", "nodes", "iterations")
-KEYS = ["problem", "success", "status", *FIGURES, "build_s", "solve_s", "verify_s", "checks"]
+KEYS = ["problem", "success", "status", "warnings", *FIGURES, "build_s", "solve_s", "verify_s", "checks"]
 
 PUSH = """
     \"\"\"A push.\"\"\"
@@ -106,7 +106,7 @@ def test_numbers_that_are_not_finite_become_null():
 
     class Diverged:
         problem = type("Problem", (), {"name": "p"})
-        success, status, order, steps, iterations = False, "diverging", 2, 4, 7
+        success, status, warnings, order, steps, iterations = False, "diverging", (), 2, 4, 7
         objective, duration, final_mass = float("nan"), float("inf"), 1.0
         build_s, solve_s, position = 0.1, 0.2, [0] * 5
 

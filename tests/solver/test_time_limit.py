@@ -1,0 +1,64 @@
+"""A time limit ends a solve with the best answer so far, which says so."""
+
+import json
+
+import pytest
+
+from dmoc import load, solve
+from dmoc.cli.app import main
+from dmoc.nlp import ipopt
+from dmoc.scene.problem_file import load_problem
+
+
+class Clock:
+    """A clock on which every iteration of Ipopt, and every look at the time, takes a hundredth of a second."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        self.now += 0.01
+        return self.now
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch):
+    monkeypatch.setattr(ipopt.time, "monotonic", Clock())
+
+
+def test_the_answer_on_the_last_solved_mesh_is_kept(tmp_path):
+    problem = load_problem("two_body_fuel").make()
+    whole = solve(problem, tol=1e-4)
+    cut = solve(problem, tol=1e-4, time_limit=2.0)
+    assert whole.success and not cut.success and cut.optimal and cut.status == "time limit"
+    assert cut.objective == pytest.approx(whole.objective, rel=0.05)
+    assert sum(level.iterations for level in cut.ladder) < whole.iterations
+    assert f"order {cut.order}, {cut.steps} steps" in cut.message and "time limit of 2 s" in cut.message
+    cut.save(tmp_path / "cut.nc")
+    assert load(tmp_path / "cut.nc").status == "time limit"
+
+
+def test_nothing_solved_in_time_is_a_failure():
+    solution = solve(load_problem("two_body_fuel").make(), time_limit=0.03)
+    assert not solution.success and not solution.optimal
+    assert "before any mesh was solved: give more time" in solution.message
+
+
+def test_time_that_is_enough_changes_nothing():
+    solution = solve(load_problem("orbit_raise").make(), time_limit=1000.0)
+    assert solution.success and solution.warnings == ()
+
+
+@pytest.mark.parametrize("limit, code", [("0.03", 3), ("2", 4)])
+def test_the_exit_code_tells(limit, code, capsys):
+    with pytest.raises(SystemExit) as done:
+        main(["solve", "two_body_fuel", "--tol", "1e-4", "--time-limit", limit, "--json"])
+    assert done.value.code == code
+    assert json.loads(capsys.readouterr().out)["success"] is False
+
+
+@pytest.mark.parametrize("bad", ["0", "-1", "nan"])
+def test_a_limit_without_meaning_is_refused(bad, capsys):
+    with pytest.raises(SystemExit) as done:
+        main(["solve", "two_body_fuel", "--time-limit", bad])
+    assert done.value.code == 2 and "time_limit" in capsys.readouterr().err
