@@ -84,9 +84,8 @@ class Ladder:
         cause = None
         for mesh, rounding in rounding_stages(meshes, self.problem.actuator.smoothing):
             this = first.order if mesh is first.mesh else order
-            start = known.onto(mesh, this, first.hold)
-            rung = self._solved_sooner_or_later(start, first.onto(mesh, this, first.hold), rounding)
-            rung = self._explained(rung, start, rounding, cause)
+            start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
+            rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
             cause = rung.cause
             hopeless = cause is not None and HOPELESS < cause.excess < np.inf
             if rung.stopped or (not rung.solved and hopeless):
@@ -95,13 +94,31 @@ class Ladder:
             known = rung.path if rung.solved else first
         return rung if rung.solved else self._by_half(rung, first)
 
-    def _solved_sooner_or_later(self, start: DiscretePath, first: DiscretePath, rounding: float | None) -> Rung:
+    def _solved_or_explained(
+        self, start: DiscretePath, first: DiscretePath, rounding: float | None, known: Cause | None, last: bool
+    ) -> Rung:
+        """An answer, or why there is none.
+
+        From a guess it is tried in few iterations first, as the search for a cause may find a path; not on the
+        last mesh if a cause is known from one before.
+        """
+        given = any("max_" in name for name in self.options or ())
+        quick = not (start.multipliers or (last and known) or given) and len(start.position) <= MOST_EXPLAINED
+        rung = self._solved_sooner_or_later(start, first, rounding, MOST_TRYING if quick else None)
+        rung = self._explained(rung, start, rounding, known)
+        if not quick or not self._unexplained(rung):
+            return rung
+        return replace(self._solved_sooner_or_later(start, first, rounding), cause=rung.cause)
+
+    def _solved_sooner_or_later(
+        self, start: DiscretePath, first: DiscretePath, rounding: float | None, most: int | None = None
+    ) -> Rung:
         """An attempt and, where the duration is free and it fails, another one with a longer duration."""
-        rung = self.solve_on(start, rounding)
+        rung = self.solve_on(start, rounding, most)
         if rung.solved or rung.stopped or not self.problem.free_duration:
             return rung
         longer = min(self.problem.duration_bounds[1], LONGER * first.duration)
-        return self.solve_on(replace(first, duration=longer), rounding)
+        return self.solve_on(replace(first, duration=longer), rounding, most)
 
     def _unexplained(self, rung: Rung) -> bool:
         """Whether an attempt failed without a reason; one that the user cut short has a reason."""
@@ -125,7 +142,9 @@ class Ladder:
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
         cause = cause_of(self._rounded(rounding), start)
-        return replace(rung, cause=cause) if cause.path is None else self.solve_on(cause.path, rounding)
+        if cause.path is None:
+            return replace(rung, cause=cause)
+        return self.solve_on(cause.path, rounding, MOST_TRYING)
 
     def try_on(
         self,
@@ -164,18 +183,21 @@ class Ladder:
                 break
         return rung
 
-    def solve_on(self, guess: DiscretePath, rounding: float | None = None) -> Rung:
-        """Solve on the mesh of a guess; a warm start that fails is tried again cold."""
-        problem = self._rounded(rounding)
+    def solve_on(self, guess: DiscretePath, rounding: float | None = None, most: int | None = None) -> Rung:
+        """Solve on the mesh of a guess, in `most` iterations a try.
+
+        A warm start that fails is tried again cold.
+        """
+        problem, limits = self._rounded(rounding), {} if most is None else {"ipopt.max_iter": most}
         if guess.multipliers:
-            warm = self._attempt(guess, problem)
+            warm = self._attempt(guess, problem, limits)
             if warm.solved or warm.stopped:
                 return warm
             guess = replace(guess, multipliers={})
         near = in_tube(problem, guess)
-        if near is not None and (tubed := self._attempt(guess, near)).solved:
+        if near is not None and (tubed := self._attempt(guess, near, limits)).solved:
             guess = out_of_tube(tubed.path)
-        return self._attempt(guess, problem)
+        return self._attempt(guess, problem, limits)
 
     def _attempt(
         self,
