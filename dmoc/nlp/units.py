@@ -54,7 +54,7 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     force = float(np.abs(guess.control).max(initial=0.0)) if guess.multipliers else 0.0
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
-    force = force or typical
+    force = max(force, LEAST_SHARE * typical) if force else typical
     cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, force))) or 1.0
     return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
 

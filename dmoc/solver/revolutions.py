@@ -29,6 +29,9 @@ NO_CHOICE = 0.1
 # The least effort of a duration is found on at least this many steps of order 6, and on at most five times as
 # many.
 SOUNDING_STEPS = 20
+# The duration of the best answer is freed if that may save more than this part of the objective, to first order
+# [-].
+NOTHING_TO_GAIN = 1e-9
 # The problem itself is solved on a coarse mesh from this many of the durations, the most promising ones.
 MOST_SOLVED = 3
 
@@ -72,7 +75,7 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
         rung = _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
         if rung.solved and (best is None or _cost(rung) < _cost(best)):
             best = rung
-    if best is None or not best.pinned:
+    if best is None or not best.pinned or best.gain < NOTHING_TO_GAIN:
         return best
     freed = ladder.try_on(best.path)
     return freed if freed.solved else best

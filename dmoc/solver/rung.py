@@ -55,7 +55,8 @@ class Rung:
         """
         if not self.pinned:
             return 0.0
-        path, cost = self.path, max(abs(self.level.objective), np.finfo(float).tiny)
+        # Where nothing is to be paid, the unit of the cost stands in for it.
+        path, cost = self.path, max(abs(self.level.objective), self.nlp.units.cost)
         return float(np.abs(path.multipliers[DURATION]).max() * path.duration / cost)
 
     def warnings(self) -> tuple[str, ...]:
