@@ -159,7 +159,7 @@ def test_to_coast_is_found_soon_where_it_may_end_anywhere(start, duration):
     if coast.free_duration:
         # On a mesh that is given no other durations are tried first.
         strict = {"ipopt.acceptable_iter": 0, "ipopt.max_iter": 100}
-        mesh = np.linspace(0, 1, 101)
+        mesh = np.linspace(0, 1, 401)
         assert max(level.iterations for level in solve(coast, mesh=mesh, options=strict).ladder) == 100
 
 
