@@ -26,6 +26,10 @@ SPACING = 0.5
 MOST_TRIED = 16
 # Where the durations that are allowed differ by less than this, in revolutions, there is nothing to choose.
 NO_CHOICE = 0.1
+# A body that cannot go half round in the longest duration, as on an ascent, has no revolutions to choose.
+HALF_ROUND = 0.5
+# Of two answers whose costs differ by less than this part [-] the shorter one is taken.
+ALIKE = 1e-3
 # The least effort of a duration is found on at least this many steps of order 6, and on at most five times as
 # many.
 SOUNDING_STEPS = 20
@@ -71,14 +75,32 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
         # Least effort without a limit costs about as much as the answer to the problem, or more.
         if best is not None and one.cost > _cost(best):
             break
-        steps = max(COARSEST_NODES[True] // (order // 2), least_steps(problem, one.path))
-        rung = _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
+        rung = _solved(ladder, one, order, hold)
         if rung.solved and (best is None or _cost(rung) < _cost(best)):
             best = rung
+    if best is not None and best.pinned:
+        best = _shortest_alike(ladder, best, [one for one in soundings if one.excess == 0], hold)
     if best is None or not best.pinned or best.gain < NOTHING_TO_GAIN:
         return best
     freed = ladder.try_on(best.path)
     return freed if freed.solved else best
+
+
+def _shortest_alike(ladder: Ladder, best: Rung, soundings: list[_Sounding], hold: bool) -> Rung:
+    """An answer that costs as much as the best one and takes less time, if there is one: it does not coast."""
+    for one in sorted(soundings, key=lambda one: -one.path.duration):
+        if one.path.duration < best.path.duration:
+            rung = _solved(ladder, one, best.nlp.scheme.order, hold)
+            if not rung.solved or _cost(rung) > _cost(best) + ALIKE * abs(_cost(best)):
+                break
+            best = rung
+    return best
+
+
+def _solved(ladder: Ladder, one: _Sounding, order: int, hold: bool) -> Rung:
+    """The problem itself from the path of least effort of one duration."""
+    steps = max(COARSEST_NODES[True] // (order // 2), least_steps(ladder.problem, one.path))
+    return _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
 
 
 def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
@@ -99,10 +121,10 @@ def _durations(problem: TransferProblem) -> list[float]:
     places = np.array([position for position, _ in end_estimates(problem, shortest)])
     if not np.isfinite(places).all():
         return []
-    revolutions = (longest - shortest) * problem.attraction.rates(places).max() / (2 * np.pi)
-    if revolutions < NO_CHOICE:
+    rate = problem.attraction.rates(places).max() / (2 * np.pi)
+    if longest * rate < HALF_ROUND or (longest - shortest) * rate < NO_CHOICE:
         return []
-    count = int(np.clip(np.ceil(revolutions / SPACING) + 1, 2, MOST_TRIED))
+    count = int(np.clip(np.ceil((longest - shortest) * rate / SPACING) + 1, 2, MOST_TRIED))
     return np.linspace(shortest, longest, count).tolist()
 
 
