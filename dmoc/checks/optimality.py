@@ -14,6 +14,10 @@ from dmoc.nlp.solving import NLP
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import units_of
 
+# Where a node's share of the time is less than this part of the mean one, it counts as that [-]: the solver ends
+# with about the same error in every derivative, which divided by the shortest steps at a switch says nothing.
+SHORT = 0.1
+
 
 @dataclass(frozen=True)
 class Stationarity:
@@ -68,7 +72,7 @@ def stationarity(evidence: Evidence) -> Stationarity:
     ]
     stated = evidence.solution.objective * evidence.problem.objective.sense / nlp.units.cost
     return Stationarity(
-        float(np.abs(force.of(slope) / weights["control"][:, None]).max(initial=0.0)),
+        float(np.abs(force.of(slope) / _not_tiny(weights["control"], SHORT)).max(initial=0.0)),
         float(np.max([np.abs(np.cumsum(part, axis=0)).max(initial=0.0) for part in along])),
         float(np.max(idle)),
         float(abs(cost - stated)),
@@ -135,5 +139,5 @@ def _idle(layout: Any, multipliers, values, lower, upper, weights: dict) -> floa
     return float(np.max(worst))
 
 
-def _not_tiny(weights: np.ndarray) -> np.ndarray:
-    return np.maximum(weights, np.mean(weights))[:, None]
+def _not_tiny(weights: np.ndarray, share: float = 1.0) -> np.ndarray:
+    return np.maximum(weights, share * np.mean(weights))[:, None]
