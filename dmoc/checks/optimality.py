@@ -14,7 +14,7 @@ from dmoc.nlp.solving import NLP
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import units_of
 
-# Where a node's share of the time is less than this part of the mean one, it counts as that [-]: the solver ends
+# Where a node has less than this part of the mean share of the time, it counts as that [-]: the solver ends
 # with about the same error in every derivative, which divided by the shortest steps at a switch says nothing.
 SHORT = 0.1
 
