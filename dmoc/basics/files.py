@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from dmoc.basics.arguments import short
 
@@ -17,6 +19,8 @@ LONGEST = 200
 SEAL = b"\ndmoc sha256 "
 # The remedy that is told where a file is damaged.
 AGAIN = "copy it or write it again"
+# A sealed JSON object holds the checksum of its other entries under this name.
+CHECKSUM = "sha256"
 
 
 def as_path(path: str | os.PathLike) -> Path:
@@ -84,6 +88,38 @@ def is_sealed(path: Path) -> bool:
     if found != wanted and sum(a == b for a, b in zip(found, SEAL, strict=False)) > len(SEAL) / 2:
         raise ValueError(f"{path} is damaged: its checksum does not hold; {AGAIN}")
     return found == wanted
+
+
+def sealed_object(entries: dict[str, Any]) -> dict[str, Any]:
+    """The entries, which JSON can hold, and the checksum of them all."""
+    return entries | {CHECKSUM: _sum_of(entries)}
+
+
+def unsealed_object(text: str | bytes) -> dict[str, Any] | None:
+    """The entries in the JSON of a sealed object, without the checksum; None if that does not hold."""
+    entries = json_object(text)
+    if entries is None:
+        return None
+    known = entries.pop(CHECKSUM, None)
+    try:
+        return entries if known == _sum_of(entries) else None
+    except UnicodeEncodeError:  # half of a letter of two parts, which nothing here has written
+        return None
+
+
+def json_object(text: str | bytes) -> dict[str, Any] | None:
+    """The object in a JSON text; None if there is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):  # brackets in brackets in brackets
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _sum_of(entries: dict[str, Any]) -> str:
+    """A checksum that does not depend on how JSON is laid out: what is read back has the same."""
+    plain = json.loads(json.dumps(entries))
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def _seal_of(content: bytes) -> bytes:

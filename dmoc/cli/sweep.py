@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from dmoc.cli.options import (
     Settings,
     Steps,
     switch,
+    warn,
     writable,
 )
 
@@ -80,7 +82,7 @@ def sweep(
     begun = time.perf_counter()
     numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
     spread: dict[str, Any] = {"sample": sample, "method": method, "seed": seed}
-    with _live(not quiet) as (progress, tries), _says_what_is_kept(out, tries):
+    with _live(not quiet) as (progress, tries), _says_what_is_kept(out, tries), _warns_in_a_line():
         data = sweeping.sweep(
             problem,
             parse_vary(vary),
@@ -138,6 +140,16 @@ def _says_what_is_kept(out: Path, tries: dict[str, int]) -> Iterator[None]:
             words = f"{tries['done']} of {tries['all']} points are kept in {journal}"
             print(f"{words}; give the same command again to go on", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def _warns_in_a_line() -> Iterator[None]:
+    """What dmoc warns of is one line of words, without the line of the program that it comes from."""
+    with warnings.catch_warnings():
+        # a worker's own warnings never come here: what it writes is thrown away
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = lambda message, *_, **__: warn(str(message))
+        yield
 
 
 @contextmanager

@@ -1,21 +1,26 @@
 """The journal of a sweep: one line of JSON a finished point, on the disk before the next is begun.
 
 A sweep that is killed at any moment loses the points under way and nothing else. The first line
-says what sweep it is. A line that was cut short, and what follows it, is solved again.
+says what sweep it is. Every line has a checksum: the point of a line that was cut short or changed is
+solved again, and the other lines count.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import warnings
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from dmoc.basics.files import json_object, sealed_object, unsealed_object
 from dmoc.basics.plain import finite
 
 # The first line of a journal names this format: a file that does not is never written over.
 JOURNAL_FORMAT = "dmoc sweep journal"
+# The version of the lines: those of version 1 had no checksum.
+JOURNAL_VERSION = 2
 # A journal is named like the result file, with this at the end.
 SUFFIX = ".journal"
 # The remedy that is told where a journal belongs to another sweep.
@@ -42,7 +47,13 @@ class Journal:
     Raises
     ------
     ValueError
-        If the journal that is there belongs to another sweep, or another process writes to it.
+        If the journal that is there belongs to another sweep, its first line is damaged, or another process
+        writes to it.
+
+    Warns
+    -----
+    UserWarning
+        If lines are damaged, whose points have to be solved again.
     """
 
     def __init__(self, out: str | os.PathLike, facts: dict[str, Any], restart: bool = False):
@@ -53,9 +64,11 @@ class Journal:
             raise ValueError(f"cannot write {out}: there is no folder {self.path.parent}; create it first")
         if Path(out).is_dir():
             raise ValueError(f"cannot write {out}: it is a folder; add a file name")
+        if self.path.exists() and not self.path.is_file():
+            raise ValueError(f"{self.path} is no file; move it away, or give another --out")
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            self._begin({"format": JOURNAL_FORMAT, "version": 1, **facts}, restart)
+            self._begin({"format": JOURNAL_FORMAT, "version": JOURNAL_VERSION, **facts}, restart)
         except BaseException:
             os.close(self._file)
             raise
@@ -111,22 +124,39 @@ class Journal:
         if facts is None or not head.endswith(b"\n"):
             return 0
         # `facts` through JSON and back: tuples become lists, as they are in the file
-        if changes := differences(_parsed(head) or {}, json.loads(json.dumps(facts))):
+        if changes := differences(self._known(head), json.loads(json.dumps(facts))):
             raise ValueError(f"{self.path} belongs to another sweep: {'; '.join(changes)}; {KEPT}")
-        end = len(head)
+        end, damaged = len(head), 0
         for line in stream:
-            entry = _parsed(line)
-            if entry is None:
+            if not line.endswith(b"\n"):
                 break
-            key = entry["wave"], entry["point"]
-            self.records[key], self._places[key] = entry["record"], end
+            if (entry := _entry(line)) is None:
+                damaged += 1
+            else:
+                key = entry["wave"], entry["point"]
+                self.records[key], self._places[key] = entry["record"], end
             end += len(line)
+        if damaged:
+            told = f"{damaged} lines of {self.path} are" if damaged > 1 else f"a line of {self.path} is"
+            warnings.warn(f"{told} damaged; what stood there is solved again", stacklevel=2)
         return end
+
+    def _known(self, head: bytes) -> dict[str, Any]:
+        """What the first line says of the sweep, or a ValueError."""
+        version = (json_object(head) or {}).get("version", JOURNAL_VERSION)
+        if version != JOURNAL_VERSION:
+            raise ValueError(
+                f"{self.path} comes from another dmoc (format {version!r}, this one has {JOURNAL_VERSION}); "
+                f"go on with that one; or {KEPT}"
+            )
+        if (found := unsealed_object(head)) is None:
+            raise ValueError(f"{self.path} is damaged: the checksum of its first line does not hold; {KEPT}")
+        return found
 
     def _write(self, entry: dict[str, Any]) -> int:
         """Append one line, and where it begins."""
         place = os.lseek(self._file, 0, os.SEEK_END)
-        line = json.dumps(entry, allow_nan=False).encode() + b"\n"
+        line = json.dumps(sealed_object(entry), allow_nan=False).encode() + b"\n"
         try:
             while line:
                 line = line[os.write(self._file, line) :]
@@ -166,13 +196,13 @@ def _value_in_words(value: Any) -> str:
     return "not given" if value is None else str(value)
 
 
-def _parsed(line: bytes) -> dict[str, Any] | None:
-    """The entry of a line, or None if it was cut short or is none."""
-    try:
-        entry = json.loads(line) if line.endswith(b"\n") else None
-    except ValueError:
+def _entry(line: bytes) -> dict[str, Any] | None:
+    """The entry of a line, or None if it is damaged or is none."""
+    kinds: dict[str, Any] = {"wave": int, "point": int, "record": dict, "path": (str, type(None))}
+    entry = unsealed_object(line)
+    if entry is None or kinds.keys() != entry.keys():
         return None
-    return entry if isinstance(entry, dict) else None
+    return entry if all(isinstance(entry[name], kind) for name, kind in kinds.items()) else None
 
 
 def _settle(folder: Path) -> None:
