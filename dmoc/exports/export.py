@@ -18,7 +18,7 @@ import numpy as np
 
 from dmoc import __version__
 from dmoc.basics.arguments import flag, of_kind
-from dmoc.basics.files import as_path
+from dmoc.basics.files import as_path, json_object, sealed_object, unsealed_object
 from dmoc.exports import functions as export_functions
 from dmoc.exports import planner as export_solver
 from dmoc.exports import residual as export_residual
@@ -31,8 +31,10 @@ from dmoc.solver.meshes import DEFAULT_STEPS
 
 # The manifest names this format: a folder whose manifest does not is never written over.
 EXPORT_FORMAT = "dmoc export"
-# The version of the manifest, for programs that read it.
-EXPORT_VERSION = 1
+# The version of the manifest, for programs that read it: one of version 1 has no checksum of its own.
+EXPORT_VERSION = 2
+# The remedy that is told where a folder holds what an export must not take the place of.
+MOVE = "name a new folder, or move what is there"
 
 
 def export(
@@ -51,7 +53,7 @@ def export(
     path [N]), `residual_jacobian`, `cost`, `solver` and `warm_solver` (Ipopt with states, mass, limits, times
     and a guess as inputs) and `nominal` (the problem's own inputs of the solver) become `.casadi` files that
     CasADi alone loads, in Python, C++, MATLAB or Octave; step, rollout and residual become C code too.
-    `manifest.json` has shape, unit and meaning of every argument and the checksum of every file.
+    `manifest.json` has shape, unit and meaning of every argument, the checksum of every file and its own.
 
     An `nlpsol` has no status output. The solver's outputs `largest_residual` [N] and `violation` [-] say
     whether a plan can be flown; whether it is an optimum, `solver.stats()["return_status"]` says, also after
@@ -65,7 +67,8 @@ def export(
     ----------
     problem : TransferProblem
     folder : path
-        Made by this call; if it is there, it must be empty or hold an earlier export and nothing else.
+        Made by this call; if it is there, it must be empty or hold an earlier export as it was written and
+        nothing else.
         It is written whole or not at all.
     order : int
         2, 4, 6 or 8.
@@ -106,8 +109,8 @@ def export(
         (work / "README.md").write_text(README.format(name=problem.name, code=CODE if c else ""))
         files = sorted(path.relative_to(work) for path in work.rglob("*") if path.is_file())
         sums = {file.as_posix(): hashlib.sha256((work / file).read_bytes()).hexdigest() for file in files}
-        manifest = json.dumps(_manifest(planner, functions, c, sums), indent=1, default=_plain)
-        (work / "manifest.json").write_text(manifest + "\n")
+        plain = json.loads(json.dumps(_manifest(planner, functions, c, sums), default=_plain))
+        (work / "manifest.json").write_text(json.dumps(sealed_object(plain), indent=1) + "\n")
     return [target / "manifest.json", *(target / file for file in files)]
 
 
@@ -187,22 +190,37 @@ def _checked_folder(folder: Path) -> Path:
     if target == Path.cwd():
         raise ValueError(f"cannot export to {folder}: it is the working folder; name a new folder in it")
     there = {path.relative_to(target).as_posix() for path in target.rglob("*") if not path.is_dir()}
-    foreign = sorted(there - _exported_before(target))
-    if foreign:
+    before = _exported_before(target, there)
+    if foreign := sorted(there - before.keys() - {"manifest.json"}):
         raise ValueError(
-            f"cannot export to {folder}: it holds files that no earlier export wrote, such as {foreign[0]}; "
-            "name a new folder, or move them"
+            f"cannot export to {folder}: it holds what no earlier export wrote, such as {foreign[0]}; {MOVE}"
         )
+    for name, checksum in before.items():
+        if name in there and hashlib.sha256((target / name).read_bytes()).hexdigest() != checksum:
+            raise ValueError(f"cannot export to {folder}: {name} was changed since it was exported; {MOVE}")
     return target
 
 
-def _exported_before(folder: Path) -> set[str]:
-    """The files an earlier export wrote to a folder."""
-    try:
-        manifest = json.loads((folder / "manifest.json").read_text())
-        return {"manifest.json", *manifest["files"]} if manifest["format"] == EXPORT_FORMAT else set()
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
+def _exported_before(folder: Path, there: set[str]) -> dict[str, str]:
+    """The files of an earlier export in a folder, with their checksums; ValueError if the manifest is damaged."""
+    if "manifest.json" not in there:
+        return {}
+    text = (folder / "manifest.json").read_bytes()
+    manifest = json_object(text) or {}
+    version, files = manifest.get("format_version"), manifest.get("files")
+    whole = version == 1 or unsealed_object(text) is not None
+    if manifest.get("format") != EXPORT_FORMAT or not isinstance(files, dict):
+        raise ValueError(f"cannot export to {folder}: its manifest.json is no manifest of an export; {MOVE}")
+    if isinstance(version, int) and version > EXPORT_VERSION and whole:
+        raise ValueError(
+            f"cannot export to {folder}: the export there comes from a newer dmoc (format {version}, "
+            f"this one reads up to {EXPORT_VERSION}); {MOVE}"
+        )
+    if not whole:
+        raise ValueError(
+            f"cannot export to {folder}: its manifest.json is damaged, its checksum does not hold; {MOVE}"
+        )
+    return files
 
 
 @contextmanager

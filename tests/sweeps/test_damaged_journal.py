@@ -53,7 +53,16 @@ def test_no_flipped_bit_changes_a_record_or_loses_another(out):
             assert all(RECORDS[key] == record for key, record in records.items())
 
 
-ODD = ["1", "[]", "null", '"wave"', "{}", '{"wave": 0}', "[" * 100_000, '{"wave": 0, "point": "x", "record": 1}']
+ODD = [
+    "1",
+    "[]",
+    "null",
+    '"wave"',
+    "{}",
+    '{"wave": 0}',
+    "[" * 100_000,
+    '{"wave": 0, "point": "x", "record": 1}',
+]
 
 
 @pytest.mark.parametrize("line", [*ODD, "\udcff", json.dumps(sealed_object({"wave": 0}))])
