@@ -202,7 +202,7 @@ def _checked_folder(folder: Path) -> Path:
 
 
 def _exported_before(folder: Path, there: set[str]) -> dict[str, str]:
-    """The files of an earlier export in a folder, with their checksums; ValueError if the manifest is damaged."""
+    """The files of an earlier export in a folder, by checksum; ValueError if the manifest is damaged."""
     if "manifest.json" not in there:
         return {}
     text = (folder / "manifest.json").read_bytes()
