@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.guess.around import path_around, shortest_flyable
+from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -17,6 +18,10 @@ from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
 from dmoc.motion.momenta import legendre_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
+
+# From this many revolutions on a guess to an open place on an orbit is the path of least effort: with fewer, an
+# orbit that changes evenly leads to the same answer sooner.
+VERY_MANY_TURNS = 8
 
 
 def starting_guess(
@@ -46,6 +51,8 @@ def starting_guess(
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = duration or guess_duration(problem)
+    if given is None and (best := _least_effort(problem, mesh, order, hold, duration)) is not None:
+        return best
     spiral = False
     if given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)
@@ -66,6 +73,35 @@ def starting_guess(
     mass = np.full(len(fractions), problem.mass)
     guess = DiscretePath(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
+
+
+def _least_effort(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
+) -> DiscretePath | None:
+    """Very many revolutions from a known state to an open place on an orbit, at the least effort.
+
+    A guess that does not meet the equations of motion so well is many revolutions off at the end, and over
+    hundreds of them Ipopt does not find the way back.
+    """
+    attractor, start = problem.attraction.lone, problem.start.fixed()
+    # Only where the controls are the force, or the force and its magnitude, are they known from the force.
+    more = problem.actuator.labels(problem.dimension)[problem.dimension :]
+    free = problem.goal.anchored or np.isnan(start).any()
+    if attractor is None or problem.constraints or free or more not in ((), ("throttle",)):
+        return None
+    if duration * problem.attraction.rates(start[0][None])[0] < 2 * np.pi * VERY_MANY_TURNS:
+        return None
+    path = least_effort(problem, duration, start)
+    if path is None:
+        return None
+    rule = scheme(order)
+    position, velocity, force, mass = path(node_fractions(mesh, rule))
+    position[0] = start[0]
+    if hold:
+        force = np.einsum("j,jkn->kn", rule.weights, force[step_nodes(len(mesh) - 1, rule)])
+    thrust = np.linalg.norm(force, axis=1, keepdims=True)
+    control = np.hstack([force, thrust]) if more else force
+    return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])
 
 
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:

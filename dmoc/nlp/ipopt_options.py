@@ -8,16 +8,22 @@ import numpy as np
 
 from dmoc.scene.problem import TransferProblem
 
+# From this many revolutions on the rounding that revolutions amplify counts.
+VERY_MANY_TURNS = 8
 
-def tolerance(mesh: np.ndarray, degree: int, limited: bool) -> float:
+
+def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:
     """Ipopt's tolerance for scaled rows and gradients [-].
 
     A row is the momentum of one node, over a share of the duration that falls with the number of steps: for the
     same error of the force the tolerance must fall as well, down to the rounding of positions over the
     shortest step. Without limits the last iterations converge quadratically: another digit or two cost one of
-    them at most.
+    them at most. Over very many revolutions to an open place on an orbit that place hardly changes the cost,
+    and rounding is amplified by the angle passed.
     """
     floor = 20 * np.finfo(float).eps * degree / np.diff(mesh).min()
+    if turns > VERY_MANY_TURNS:
+        floor *= 2 * np.pi * turns
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
 
 
@@ -31,7 +37,7 @@ def settings_for(
     settings: dict[str, Any] = {
         # Limits are kept as they are given: Ipopt would loosen them by 1e-8.
         "ipopt.bound_relax_factor": 0.0,
-        "ipopt.tol": tolerance(mesh, degree, problem.limited),
+        "ipopt.tol": tolerance(mesh, degree, problem.limited, _turns(problem)),
         "ipopt.constr_viol_tol": 1e-6,
         # At some optima the objective does not change in one direction, along which Ipopt would wander on: a
         # run ends after ten iterations without a gain.
@@ -56,6 +62,14 @@ def settings_for(
         settings |= {"ipopt.warm_start_init_point": "yes", "ipopt.mu_init": 1e-6}
         settings |= {f"ipopt.warm_start_{name}": push for name in pushed}
     return settings
+
+
+def _turns(problem: TransferProblem) -> float:
+    """About the revolutions to an open place around the attractor, at the rate of the start; else 0."""
+    place = problem.start.fixed()[0][None]
+    if problem.attraction.lone is None or problem.goal.anchored or np.isnan(place).any():
+        return 0.0
+    return float(problem.duration_bounds[0] * problem.attraction.rates(place)[0] / (2 * np.pi))
 
 
 def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, Any]:
