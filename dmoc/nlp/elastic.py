@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import ALWAYS
+from dmoc.nlp.ipopt import ALWAYS, run
 from dmoc.nlp.solving import NLP
+from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
 
 # The objective is the sum of the slacks plus this part of the scaled effort [-]: the effort makes the path
@@ -18,6 +21,8 @@ from dmoc.scene.problem import TransferProblem
 EFFORT_SHARE = 1e-4
 # A run of the elastic NLP is given up after this many iterations: those that converged took fewer than 100.
 MOST_ITERATIONS = 200
+# A ladder tells of these runs by this question.
+QUESTION = "how far limits must give way"
 # A row counts as met if its scaled violation is below this [-].
 MET = 1e-7
 # Ipopt gets these options where it starts from an answer near by: it stays within 1e-8 of the limits that act,
@@ -61,10 +66,22 @@ class Relaxation:
         Unknowns whose limits give way by the first slack.
     below, above : arrays
         How far the lower and the upper limits of these unknowns give way for a slack of 1, scaled.
+    tell : callable
+        Takes the `Level` of every run.
     """
 
-    def __init__(self, nlp: NLP, rows: np.ndarray, columns=(), below=(), above=(), least: float = 0.0):
-        self.nlp, self.least, self.count = nlp, least, rows.shape[1]
+    def __init__(
+        self,
+        nlp: NLP,
+        rows: np.ndarray,
+        columns=(),
+        below=(),
+        above=(),
+        least: float = 0.0,
+        tell: Callable[[Level], None] = lambda level: None,
+    ):
+        begun = time.perf_counter()
+        self.nlp, self.least, self.count, self.tell = nlp, least, rows.shape[1], tell
         self.columns = np.asarray(columns, int)
         number = len(self.columns)
         # A bound on an unknown has no place for a slack, so these bounds become rows, one for either side.
@@ -76,6 +93,7 @@ class Relaxation:
         nlp_parts, settings = self._parts(_sparse(rows), ca.vertcat(pick, pick), _sparse(share))
         self.solver = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings)
         self.warm = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings | WARM)
+        self._built = time.perf_counter() - begun
 
     def _parts(self, elastic: ca.DM, pick: ca.DM, share: ca.DM) -> tuple[dict, dict]:
         """The elastic NLP, and Ipopt's settings with its exact derivatives."""
@@ -123,13 +141,15 @@ class Relaxation:
             "ubg": np.concatenate([ubg, high, none]),
         }
         known = {} if near is None else near.multipliers
-        found: Any = solver(
-            x0=np.concatenate([start, slack]), p=self.nlp.parameters(problem), **bounds, **known
+        found: Any = run(
+            solver, x0=np.concatenate([start, slack]), p=self.nlp.parameters(problem), **bounds, **known
         )
-        z, g = (np.array(found[key]).ravel() for key in ("x", "g"))
+        self.tell(replace(self.nlp.level(found, self._built), question=QUESTION))
+        self._built = 0.0
+        z, g = found.x, found.g
         excess = np.maximum(bounds["lbg"] - g, g - bounds["ubg"]).max(initial=0.0)
         path = self.nlp.unpack(z[: -self.count], problem)
-        multipliers = {"lam_x0": found["lam_x"], "lam_g0": found["lam_g"]}
+        multipliers = {"lam_x0": found.lam_x, "lam_g0": found.lam_g}
         return Relaxed(z[-self.count :], path, bool(np.isfinite(z).all() and excess <= MET), multipliers)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
+from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.relaxable import LEAST, Relaxable
 
@@ -56,9 +58,12 @@ class Cause:
         return "; ".join(parts)
 
 
-def cause_of(problem: TransferProblem, guess: DiscretePath) -> Cause:
-    """Why there is no path near a guess, found on its mesh: limits relaxed one by one, then every row."""
-    transfer = Relaxable(problem, guess)
+def cause_of(problem: TransferProblem, guess: DiscretePath, tell: Callable[[Level], None]) -> Cause:
+    """Why there is no path near a guess, found on its mesh: limits relaxed one by one, then every row.
+
+    `tell` takes the `Level` of every run.
+    """
+    transfer = Relaxable(problem, guess, tell)
     if (far := _far_off(transfer)) is not None:
         return far
     limits = transfer.limits()
@@ -94,7 +99,7 @@ def _far_off(transfer: Relaxable) -> Cause | None:
     problem, longest = transfer.problem, transfer.problem.duration_bounds[1]
     wider = tuple(part.times(speed) if part.limits_speed else part for part in problem.constraints)
     raised = replace(problem, actuator=problem.actuator.times(force), constraints=wider)
-    higher = Relaxable(raised, transfer.guess, given=problem)
+    higher = Relaxable(raised, transfer.guess, transfer.tell, given=problem)
     pairs = ((higher.force(), force), (higher.speed(), speed))
     limits = [limit for limit, ratio in pairs if limit and ratio > 1]
     found = higher.relaxed(*limits, least=LEAST)(raised, higher.guess)
@@ -105,7 +110,7 @@ def _far_off(transfer: Relaxable) -> Cause | None:
         return None
     needs = [" and ".join(limit.told(found.slack[0]) for limit in limits)]
     longer = longest * max(limit.factor(found.slack[0]) ** (1 / limit.falls) for limit in limits)
-    later = Relaxable(replace(problem, duration=longer), transfer.guess)
+    later = Relaxable(replace(problem, duration=longer), transfer.guess, transfer.tell)
     joint = later.relaxed(*later.limits(), least=LEAST)
     near = joint(later.problem, later.guess)
     needs += later.durations(joint, near, longest) if near.feasible else []
@@ -121,6 +126,7 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
     problem = replace(transfer.problem, actuator=free, constraints=transfer.given.constraints)
     nlp = transcribe_onto(problem, transfer.guess, units_of(problem, transfer.guess))
     answer = nlp.run(nlp.solver({"ipopt.max_iter": MOST_ITERATIONS}), problem, transfer.guess)
+    transfer.tell(replace(nlp.level(answer, 0.0), question="least effort without a limit"))
     path = replace(nlp.path(problem, answer), multipliers={})
     if answer.status != "solved" or transfer.leaps(path):
         return None
@@ -136,7 +142,7 @@ def _rows(transfer: Relaxable) -> Cause:
     """Every row made elastic: the rows that cannot be met, or the constraint that alone is in the way."""
     layout = transfer.nlp.rows
     slacks = np.hstack([np.eye(layout.size), -np.eye(layout.size)])
-    found = Relaxation(transfer.nlp, slacks)(transfer.problem, transfer.guess)
+    found = Relaxation(transfer.nlp, slacks, tell=transfer.tell)(transfer.problem, transfer.guess)
     if not found.feasible:
         return Cause()
     miss = np.abs(found.slack[: layout.size] - found.slack[layout.size :])

@@ -17,6 +17,7 @@ from dmoc.nlp.ipopt import STATUSES, Interrupt
 from dmoc.nlp.solving import Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
+from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.cause import Cause, cause_of
@@ -61,11 +62,7 @@ class Ladder:
         self.dynamics = Dynamics.of(problem)
         self.interrupt = Interrupt(time_limit)
         self._rungs: list[Rung] = []
-
-    @property
-    def rungs(self) -> tuple[Rung, ...]:
-        """All attempts so far, in their order."""
-        return tuple(self._rungs)
+        self._levels: list[Level] = []
 
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
         """The answer on the mesh of a first guess, by way of coarser meshes unless it has multipliers.
@@ -141,7 +138,7 @@ class Ladder:
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
-        cause = cause_of(self._rounded(rounding), start)
+        cause = cause_of(self._rounded(rounding), start, self._levels.append)
         if cause.path is None:
             return replace(rung, cause=cause)
         return self.solve_on(cause.path, rounding, MOST_TRYING)
@@ -225,7 +222,8 @@ class Ladder:
             raise watch.error
         level = replace(nlp.level(answer, built), question=question)
         asked = problem if question else self._asked(problem)
-        self._rungs.append(Rung(len(self._rungs), asked, nlp, answer, level, pinned=pinned))
+        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned))
+        self._levels.append(level)
         return self._rungs[-1]
 
     def _asked(self, problem: TransferProblem) -> TransferProblem:
@@ -249,7 +247,7 @@ class Ladder:
         if rung.stopped and self.interrupt.late:
             return self._out_of_time(rung, errors, **found)
         known = errors or {}
-        levels = tuple(replace(one.level, error=known.get(one.number)) for one in self._rungs)
+        levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
         reason = "" if rung.cause is None else rung.cause.words()
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)

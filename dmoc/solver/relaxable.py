@@ -16,6 +16,7 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.objectives import Effort
+from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
 
 # While a duration is looked for, the slack of a limit may fall to this [-], so that the limit is a tenth of the
@@ -54,10 +55,18 @@ class Giving:
 class Relaxable:
     """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort.
 
-    Limits are told of as those of `given`, which are smaller where they were raised.
+    Limits are told of as those of `given`, which are smaller where they were raised. `tell` takes the `Level`
+    of every run.
     """
 
-    def __init__(self, problem: TransferProblem, guess: DiscretePath, given: TransferProblem | None = None):
+    def __init__(
+        self,
+        problem: TransferProblem,
+        guess: DiscretePath,
+        tell: Callable[[Level], None],
+        given: TransferProblem | None = None,
+    ):
+        self.tell = tell
         longest = problem.duration_bounds[1]
         self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
         self.problem = replace(problem, duration=longest, objective=Effort())
@@ -72,7 +81,7 @@ class Relaxable:
         columns, below, above = (
             np.concatenate([getattr(limit, name) for limit in limits]) for name in ("columns", "below", "above")
         )
-        return Relaxation(self.nlp, rows, columns, below, above, least)
+        return Relaxation(self.nlp, rows, columns, below, above, least, self.tell)
 
     def taken(self) -> tuple[float, float]:
         """Mean force and mean speed along the guess over their limits [-]; 0 without a limit.
