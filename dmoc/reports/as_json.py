@@ -13,12 +13,16 @@ if TYPE_CHECKING:
 
 
 def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
-    """The JSON object of a solve."""
+    """The JSON object of a solve; `message` says what to try if it failed, `worst` names its worst rows."""
     listed = report.checks if report else ()
     return {
         "problem": solution.require_problem().name,
         "success": bool(solution.success),
         "status": solution.status,
+        "message": solution.message,
+        "worst": [
+            {"row": row, "violation": float(violation), "unit": unit} for row, violation, unit in solution.worst
+        ],
         "warnings": list(solution.warnings),
         "objective": float(solution.objective),
         "duration": float(solution.duration),

@@ -14,7 +14,8 @@ from dmoc.cli.app import main
 from dmoc.scene.problem_file import load_problem
 
 FIGURES = ("objective", "duration", "final_mass", "order", "steps", "nodes", "iterations")
-KEYS = ["problem", "success", "status", "warnings", *FIGURES, "build_s", "solve_s", "verify_s", "checks"]
+WORDS = ("problem", "success", "status", "message", "worst", "warnings")
+KEYS = [*WORDS, *FIGURES, "build_s", "solve_s", "verify_s", "checks"]
 
 PUSH = """
     \"\"\"A push.\"\"\"
@@ -85,6 +86,7 @@ def test_json_is_one_object_with_the_promised_keys(run):
     assert (code, err, list(found)) == (0, "", KEYS)
     assert found["problem"] == "point_to_point" and found["success"] is True
     assert (found["order"], found["steps"], found["nodes"], found["final_mass"]) == (4, 10, 21, 1.0)
+    assert (found["message"], found["worst"]) == ("a local optimum", [])
     assert found["objective"] == pytest.approx(0.75 / 13, rel=1e-9)
     assert {"residual", "rollout", "reference", "ledger", "bounds", "optimality", "stability"} == set(
         found["checks"]
@@ -107,6 +109,7 @@ def test_numbers_that_are_not_finite_become_null():
     class Diverged:
         problem = type("Problem", (), {"name": "p"})
         success, status, warnings, order, steps, iterations = False, "diverging", (), 2, 4, 7
+        message, worst = "start elsewhere", (("goal.x", float("nan"), "m"),)
         objective, duration, final_mass = float("nan"), float("inf"), 1.0
         build_s, solve_s, position = 0.1, 0.2, [0] * 5
 
@@ -116,6 +119,7 @@ def test_numbers_that_are_not_finite_become_null():
     report = Report((Check("residual", float("inf"), float("nan"), "N", False),), 0.3)
     found = json.loads(as_text(solve_object(Diverged(), report)))
     assert found["objective"] is None and found["duration"] is None
+    assert found["worst"] == [{"row": "goal.x", "violation": None, "unit": "m"}]
     assert found["checks"]["residual"] == {"value": None, "limit": None, "unit": "N", "ok": False}
 
 
@@ -125,9 +129,14 @@ def test_a_failed_solve_exits_3_names_the_worst_rows_and_what_to_try(run, folder
     code, out, _ = run("solve", "weak", "--steps", 20)
     assert code == 3
     assert "Not solved" in out and "What to try: " in out and re.search(r"dynamics\[\d+\]\.x +\d", out)
+    said = re.search("What to try: (.*)[.]$", " ".join(out.split()))[1]
     code, out, _ = run("solve", "weak", "--steps", 20, "--json")
     found = json.loads(out)
     assert (code, list(found), found["success"], found["checks"]) == (3, KEYS, False, {})
+    assert found["message"] == said and "a force limit of " in said
+    assert re.fullmatch(r"dynamics\[\d+\]\.x", found["worst"][0]["row"]) and found["worst"][0]["unit"] == "N"
+    sizes = [row["violation"] for row in found["worst"]]
+    assert sizes == sorted(sizes, reverse=True) and sizes[0] > 0.01
     assert found["status"] != "solved" and found["duration"] == 2.0 and found["nodes"] == 21
 
 
