@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, of_kind, short
+from dmoc.basics.digits import lasting
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
@@ -260,7 +261,7 @@ def _bounds(evidence: Evidence) -> Check:
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
     bound = evidence.problem.limit_of_duration(evidence.path.duration)
     if bound is not None:
-        note += f"; the duration sits on its {bound} limit of {evidence.path.duration:g} s"
+        note += f"; the duration sits on its {bound} limit of {lasting(evidence.path.duration, 6)}"
     return Check.of("bounds", worst.value, worst.allowed, worst.unit, note)
 
 

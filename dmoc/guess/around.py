@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.digits import lasting
 from dmoc.guess.coast import (
     LEAST_SAMPLES,
     MANY_TURNS,
@@ -74,7 +75,7 @@ def path_around(problem: TransferProblem, duration: float, states: Any, fraction
     """
     if (turns := duration * _turn_rate(problem, states)) > MOST_TURNS:
         raise ValueError(
-            f"on the orbits of start and goal {duration:g} s are about {turns:,.0f} revolutions; "
+            f"on the orbits of start and goal {lasting(duration, 6)} are about {turns:,.0f} revolutions; "
             "check the units of mu [m^3/s^2], positions [m] and duration [s], or give a guess"
         )
     spiral = spiral_between(problem, duration, states)

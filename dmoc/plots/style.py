@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.digits import TIMES
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
@@ -58,7 +59,7 @@ SETTINGS: Any = {
 # Values given in an SI unit are drawn in another one from this least value on: (least value, size of that unit,
 # its name), the largest first.
 _UNITS = {
-    "s": ((3 * 86400.0, 86400.0, "days"), (3 * 3600.0, 3600.0, "h")),
+    "s": TIMES,
     "m": ((1e4, 1e3, "km"),),
     "m/s": ((1e4, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
     "N": ((1e4, 1e3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e-3, "mN")),

@@ -17,7 +17,9 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from dmoc.basics.digits import lasting
 from dmoc.basics.docstrings import documented, first_line
+from dmoc.reports.ends import goal_words, met_words, start_words
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
@@ -44,13 +46,13 @@ def console(stderr: bool = False) -> Console:
 def scene(problem: TransferProblem) -> RenderableType:
     """What is to be done, in words."""
     shortest, longest = problem.duration_bounds
-    free = f"free between {shortest:g} and {longest:g} s"
+    free = f"free between {lasting(shortest, 6)} and {lasting(longest, 6)}"
     return pairs(
         [
             ("body", f"{problem.mass:g} kg, axes {', '.join('xyz'[: problem.dimension])}"),
-            ("start", problem.start.words()),
-            ("goal", problem.goal.words()),
-            ("duration", free if problem.free_duration else f"{shortest:g} s"),
+            ("start", start_words(problem)),
+            ("goal", goal_words(problem)),
+            ("duration", free if problem.free_duration else lasting(shortest, 6)),
             ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
             ("actuator", problem.actuator.words()),
             ("objective", problem.objective.words().rstrip(".")),
@@ -196,7 +198,7 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
     scale = float(abs(energy).max()) if kept else 0.0
     share = f", {most / scale:.1e} of it" if scale else ""
     rows = [
-        ("final time", f"{trajectory.time[-1]:.10g} s"),
+        ("final time", lasting(trajectory.time[-1], 10)),
         ("final position", f"{value_words(trajectory.position[-1].tolist())} m"),
         ("final velocity", f"{value_words(trajectory.velocity[-1].tolist())} m/s"),
         ("final mass", f"{trajectory.mass[-1]:.10g} kg"),
@@ -210,12 +212,13 @@ def figures(solution: Solution) -> str:
     """Such as `effort 0.075 N^2 s, duration 26 s`."""
     problem = solution.require_problem()
     name, unit = problem.objective.label, solution.provenance.objective_unit
-    parts = [f"{name} {solution.objective:.8g} {unit}".rstrip()]
+    cost = lasting(solution.objective) if unit == "s" else f"{solution.objective:.8g} {unit}".rstrip()
+    parts = [f"{name} {cost}"]
     if name != "time":
-        parts.append(f"duration {solution.duration:.8g} s")
+        parts.append(f"duration {lasting(solution.duration)}")
     if name != "final mass" and solution.final_mass != problem.mass:
         parts.append(f"final mass {solution.final_mass:.8g} kg")
-    return ", ".join(parts)
+    return ", ".join(filter(None, [*parts, met_words(solution)]))
 
 
 @contextmanager

@@ -211,9 +211,7 @@ class Moving(Boundary):
         return position, velocity[0] if velocity else np.full(self.dimension, np.nan)
 
     def words(self) -> str:
-        where = ", ".join(f"{value:.4g}" for value in self.estimate(0.0)[0])
-        velocity = "any velocity" if self.velocity is None else "its velocity"
-        return f"a point that moves, at ({where}) m at 0 s, with {velocity}"
+        return f"a point that moves, with {'any velocity' if self.velocity is None else 'its velocity'}"
 
 
 @dataclass(frozen=True)

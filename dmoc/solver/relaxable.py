@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.basics.digits import down, up
+from dmoc.basics.digits import down, time_unit, up
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import Relaxation, Relaxed
 from dmoc.nlp.layout import Group
@@ -206,7 +206,9 @@ class Relaxable:
         if enough is None:
             return []
         needed = first_duration * np.exp(enough)
-        return [f"{up(needed) if needed > given else down(needed)} s (you gave {given:g} s)"]
+        size, unit = time_unit(given)
+        enough = (up if needed > given else down)(needed / size)
+        return [f"{enough} {unit} (you gave {given / size:g} {unit})"]
 
     def leaps(self, path: DiscretePath) -> bool:
         """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""

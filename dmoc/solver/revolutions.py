@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.digits import lasting
 from dmoc.guess.open_ends import end_estimates
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.motion.lobatto import scheme
@@ -135,7 +136,7 @@ def _sounding(ladder: Ladder, duration: float) -> _Sounding | None:
     first = starting_guess(free, uniform_mesh(SOUNDING_STEPS), ORDER_OF_MANY_TURNS, False)
     steps = int(np.clip(least_steps(free, first), SOUNDING_STEPS, 5 * SOUNDING_STEPS))
     guess = starting_guess(free, uniform_mesh(steps), ORDER_OF_MANY_TURNS, False)
-    rung = ladder.ask(free, guess, f"least effort in {duration:g} s")
+    rung = ladder.ask(free, guess, f"least effort in {lasting(duration, 6)}")
     if not rung.solved:
         return None
     path = replace(rung.path, multipliers={})

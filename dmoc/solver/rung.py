@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dmoc.basics.digits import lasting
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
@@ -67,7 +68,8 @@ class Rung:
             return ()
         if bound is not None:
             other = "shorter" if bound == "shortest" else "longer"
-            return (f"the duration ends on its {bound} limit of {duration:.6g} s: a {other} one may cost less",)
+            told = f"the duration ends on its {bound} limit of {lasting(duration, 6)}"
+            return (f"{told}: a {other} one may cost less",)
         if self.gain > WORTH_TELLING:
-            return (f"the duration of {duration:.6g} s was kept as it was: another one may cost less",)
+            return (f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less",)
         return ()

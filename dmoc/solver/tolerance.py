@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.digits import time_unit
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.facts import Error
@@ -212,6 +213,7 @@ def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
         * np.interp(times - problem.start_time, path.duration * path.mesh[:-1], np.diff(path.mesh))
     )
     groups = np.split(times, np.flatnonzero(np.diff(times) > near[:-1]) + 1)
-    words = [f"{g[0]:.5g}" + f" to {g[-1]:.5g}" * (len(g) > 1) for g in groups if len(g)]
-    found = f"; switches at {', '.join(words)} s" if 0 < len(words) <= MOST_SWITCHES else ""
+    size, unit = time_unit(problem.start_time + path.duration)
+    words = [f"{g[0] / size:.5g}" + f" to {g[-1] / size:.5g}" * (len(g) > 1) for g in groups if len(g)]
+    found = f"; switches at {', '.join(words)} {unit}" if 0 < len(words) <= MOST_SWITCHES else ""
     return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}{found}"
