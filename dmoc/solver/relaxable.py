@@ -207,8 +207,8 @@ class Relaxable:
             return []
         needed = first_duration * np.exp(enough)
         size, unit = time_unit(given)
-        enough = (up if needed > given else down)(needed / size)
-        return [f"{enough} {unit} (you gave {given / size:g} {unit})"]
+        told = (up if needed > given else down)(needed / size)
+        return [f"{told} {unit} (you gave {given / size:g} {unit})"]
 
     def leaps(self, path: DiscretePath) -> bool:
         """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""
