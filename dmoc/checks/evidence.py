@@ -13,7 +13,7 @@ from dmoc.motion.flown import Flown, flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, step_nodes
-from dmoc.motion.momenta import end_momenta, legendre_momenta, step_matrices
+from dmoc.motion.momenta import end_momenta, legendre_momenta, node_velocities, step_matrices
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
@@ -74,14 +74,7 @@ class Evidence:
     @cached_property
     def node_velocity(self) -> np.ndarray:
         """Velocity at every node: from the momenta at the step ends, of a polynomial with those inside."""
-        h = self.path.duration * np.diff(self.path.mesh)[:, None]
-        ends = np.stack([self.velocity[:-1] * h, self.velocity[1:] * h])
-        velocity = np.empty_like(self.position)
-        velocity[self.at] = (
-            np.einsum("ij,jkn->ikn", self.rule.hermite_slopes(), [*self.position[self.at], *ends]) / h
-        )
-        velocity[self.ends] = self.velocity
-        return velocity
+        return node_velocities(self.path, self.velocity)
 
     @cached_property
     def point(self) -> tuple[np.ndarray, np.ndarray]:

@@ -12,21 +12,11 @@ import numpy as np
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.flown import BREAKS
+from dmoc.results.between import BOUND, cuts
 
-# A limit may be exceeded by this part of its scale [-]: the optimiser meets rows to a tolerance, not exactly.
-BOUND = 1e-6
 # A boundary entry that is fixed may be off by this part of the extent or speed [-]: it is a bound, not a row,
 # so only round-off moves it.
 FIXED = 1e-9
-# Between nodes a path may cut into a zone by at most this part of the zone's size [-], however coarse its mesh.
-DEEPEST = 1e-2
-# A gap between two nodes is looked at in at least this many places.
-FEWEST = 8
-# All gaps together are looked at in no more places than this, unless the fewest of each gap are more: that
-# bounds the memory.
-MOST_PLACES = 1_000_000
-
-
 # The control is looked at in this many places of each piece of it, which is a step as a rule.
 FLOWN_AT = 17
 
@@ -112,65 +102,10 @@ def _row_excess(
 
 
 def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
-    """Zones at the nodes and between them; a speed limit everywhere.
-
-    Rows act at nodes alone, so between two of them a path may cut into a zone. The allowance is the depth of
-    the chord, d^2 / 8r for nodes a distance d apart at a sphere of radius r, plus the distance of the path
-    from its chord. A speed limit acts on mean velocities inside the steps. A velocity at a node may differ
-    from them by half of its distance from the line between its neighbours. These allowances are of order
-    h^2, and none exceeds a hundredth of the size or the speed.
-    """
-    if not evidence.problem.constraints:
-        return
-    longest = float(np.linalg.norm(np.diff(evidence.position, axis=0), axis=1).max())
-    path, chord, velocity, straight = _inside_gaps(evidence, longest)
-    bend = _most(np.linalg.norm(path - chord, axis=1))
-    sway = _most(np.linalg.norm(velocity - straight, axis=1)) + 0.5 * _bump(evidence)
-    still = np.zeros_like(path)
-    for i, constraint in enumerate(evidence.problem.constraints):
-        name = f"{type(constraint).__name__} {i + 1}"
-        if constraint.limits_speed:
-            allowed = BOUND * evidence.speed + min(sway, DEEPEST * evidence.speed)
-            yield Excess(name, _most(constraint.excess(path, velocity)), allowed, "m/s")
-            continue
-        at_nodes = _most(constraint.excess(evidence.position, evidence.node_velocity))
-        yield Excess(f"{name} at nodes", at_nodes, BOUND * evidence.extent, constraint.unit)
-        size = constraint.feature()
-        # A zone that tells no size is judged by how deep the chords themselves cut into it.
-        cut = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
-        cut = min(cut + bend, DEEPEST * min(size, evidence.extent))
-        between = _most(constraint.excess(path, still))
-        yield Excess(f"{name} between nodes", between, BOUND * evidence.extent + cut, constraint.unit)
-
-
-def _inside_gaps(evidence: Evidence, longest: float) -> tuple[np.ndarray, ...]:
-    """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
-
-    The path is the cubic that has the positions and velocities of both nodes; it is looked at often
-    enough not to step over a zone that is smaller than the longest gap [m].
-    """
-    q, v = evidence.position, evidence.node_velocity
-    tau = evidence.path.duration * np.diff(evidence.path.fractions)[:, None, None]
-    smallest = min(constraint.feature() for constraint in evidence.problem.constraints)
-    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))
-    u = (np.arange(parts) / parts)[:, None]
-    # The cubic is the chord plus a bend that vanishes at both nodes, from the end velocities less the mean one.
-    mean = np.diff(q, axis=0)[:, None] / tau
-    first, second = v[:-1, None] - mean, v[1:, None] - mean
-    chord = q[:-1, None] + u * tau * mean
-    path = chord + tau * (u * (1 - u) ** 2 * first - u**2 * (1 - u) * second)
-    velocity = mean + (1 - 4 * u + 3 * u**2) * first + (3 * u**2 - 2 * u) * second
-    straight = (1 - u) * v[:-1, None] + u * v[1:, None]
-    inside = (values.reshape(-1, q.shape[1]) for values in (path, chord, velocity, straight))
-    return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
-
-
-def _bump(evidence: Evidence) -> float:
-    """How far the velocity at a node is at most off the line between its neighbours in time [m/s]."""
-    time, velocity = evidence.path.fractions, evidence.node_velocity
-    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
-    line = (1 - share) * velocity[:-2] + share * velocity[2:]
-    return _most(np.linalg.norm(velocity[1:-1] - line, axis=1))
+    """Zones and speed limits at the nodes and between them."""
+    scales = evidence.extent, evidence.speed
+    for cut in cuts(evidence.problem.constraints, evidence.path, evidence.node_velocity, *scales):
+        yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
 
 
 def _most(values: Any) -> float:

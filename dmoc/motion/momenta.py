@@ -41,6 +41,17 @@ def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) 
     return np.array([np.array(momentum).T.reshape(len(path.mesh) - 1, -1) for momentum in momenta])
 
 
+def node_velocities(path: DiscretePath, ends: np.ndarray) -> np.ndarray:
+    """Velocity at every node [m/s]: that at the step ends, and of a polynomial with those inside the steps."""
+    rule, h = scheme(path.order), path.duration * np.diff(path.mesh)[:, None]
+    at = step_nodes(len(path.mesh) - 1, rule)
+    known = [*path.position[at], ends[:-1] * h, ends[1:] * h]
+    velocity = np.empty_like(path.position)
+    velocity[at] = np.einsum("ij,jkn->ikn", rule.hermite_slopes(), known) / h
+    velocity[:: rule.degree] = ends
+    return velocity
+
+
 def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
 

@@ -10,11 +10,11 @@ import numpy as np
 from dmoc.basics.digits import time_unit
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES
+from dmoc.results.estimate import TINY, change, estimate, local_errors, rounding_cost
 from dmoc.results.facts import Error
 from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, is_singular, switch_times
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.estimate import TINY, change, estimate, local_errors, rounding_cost
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
 from dmoc.solver.rung import Rung

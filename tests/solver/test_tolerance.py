@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dmoc import solve, verify
+from dmoc.results.estimate import rounding_cost
 from dmoc.results.switches import switch_times
 from dmoc.scene.problem_file import load_problem
-from dmoc.solver.estimate import rounding_cost
 
 # Problem, tolerance, optimum, most steps that this may take (a few times what it takes), order.
 KNOWN = [

@@ -1,0 +1,138 @@
+"""A path between its nodes, and by how much it breaks zones and speed limits there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
+from dmoc.parts.constraint import Constraint
+
+# A limit may be exceeded by this part of its scale [-]: the optimiser meets rows to a tolerance, not exactly.
+BOUND = 1e-6
+# Between nodes a path may cut into a zone by at most this part of the zone's size [-], however coarse its mesh.
+DEEPEST = 1e-2
+# A gap between two nodes is looked at in at least this many places.
+FEWEST = 8
+# All gaps together are looked at in no more places than this, unless the fewest of each gap are more: that
+# bounds the memory.
+MOST_PLACES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Cut:
+    """How far a path breaks one constraint, and how far it may.
+
+    Attributes
+    ----------
+    name : str
+        The constraint and where it is broken, such as "KeepOut 2 between nodes".
+    index : int
+        Place of the constraint in the problem.
+    value, allowed : float
+        The largest excess and the excess that is allowed [unit].
+    unit : str
+    steps : array of int
+        The steps of the path in which more is broken than is allowed; empty for what is broken at nodes.
+    """
+
+    name: str
+    index: int
+    value: float
+    allowed: float
+    unit: str
+    steps: np.ndarray
+
+    @property
+    def ok(self) -> bool:
+        return self.value <= self.allowed
+
+
+def cuts(
+    constraints: Sequence[Constraint], path: DiscretePath, velocity: np.ndarray, extent: float, speed: float
+) -> Iterator[Cut]:
+    """Zones at the nodes and between them; a speed limit everywhere.
+
+    Rows act at nodes alone, so between two of them a path may cut into a zone. The allowance is the depth of
+    the chord, d^2 / 8r for nodes a distance d apart at a sphere of radius r, plus the distance of the path
+    from its chord. A speed limit acts on mean velocities inside the steps. A velocity at a node may differ
+    from them by half of its distance from the line between its neighbours. These allowances are of order
+    h^2, and none exceeds a hundredth of the size or the speed.
+
+    Parameters
+    ----------
+    constraints : sequence of Constraint
+    path : DiscretePath
+    velocity : array, shape (nodes, axes)
+        Velocity at every node [m/s].
+    extent, speed : float
+        The scales of the path [m], [m/s].
+    """
+    if not constraints:
+        return
+    longest = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).max())
+    inside, chord, moving, straight = _inside_gaps(constraints, path, velocity, longest)
+    bend = _most(np.linalg.norm(inside - chord, axis=1))
+    sway = _most(np.linalg.norm(moving - straight, axis=1)) + 0.5 * _bump(path, velocity)
+    still, none = np.zeros_like(inside), np.empty(0, int)
+    for i, constraint in enumerate(constraints):
+        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
+        if constraint.limits_speed:
+            allowed = BOUND * speed + min(sway, DEEPEST * speed)
+            yield Cut(name, i, _most(constraint.excess(inside, moving)), allowed, "m/s", none)
+            continue
+        at_nodes = _most(constraint.excess(path.position, velocity))
+        yield Cut(f"{name} at nodes", i, at_nodes, BOUND * extent, unit, none)
+        size = constraint.feature()
+        # A zone that tells no size is judged by how deep the chords themselves cut into it.
+        depth = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
+        allowed = BOUND * extent + min(depth + bend, DEEPEST * min(size, extent))
+        between = constraint.excess(inside, still)
+        yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, _steps(path, between > allowed))
+
+
+def _steps(path: DiscretePath, broken: np.ndarray) -> np.ndarray:
+    """The steps in which one of the places inside is broken."""
+    gaps = len(path.position) - 1
+    gap = np.flatnonzero(broken[:-1].reshape(gaps, -1).any(axis=1))
+    return np.unique(gap // scheme(path.order).degree)
+
+
+def _inside_gaps(
+    constraints: Sequence[Constraint], path: DiscretePath, v: np.ndarray, longest: float
+) -> tuple[np.ndarray, ...]:
+    """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
+
+    The path is the cubic that has the positions and velocities of both nodes; it is looked at often
+    enough not to step over a zone that is smaller than the longest gap [m].
+    """
+    q = path.position
+    tau = path.duration * np.diff(path.fractions)[:, None, None]
+    smallest = min(constraint.feature() for constraint in constraints)
+    parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))
+    u = (np.arange(parts) / parts)[:, None]
+    # The cubic is the chord plus a bend that vanishes at both nodes, from the end velocities less the mean one.
+    mean = np.diff(q, axis=0)[:, None] / tau
+    first, second = v[:-1, None] - mean, v[1:, None] - mean
+    chord = q[:-1, None] + u * tau * mean
+    cubic = chord + tau * (u * (1 - u) ** 2 * first - u**2 * (1 - u) * second)
+    velocity = mean + (1 - 4 * u + 3 * u**2) * first + (3 * u**2 - 2 * u) * second
+    straight = (1 - u) * v[:-1, None] + u * v[1:, None]
+    inside = (values.reshape(-1, q.shape[1]) for values in (cubic, chord, velocity, straight))
+    return tuple(np.concatenate([values, end[-1:]]) for values, end in zip(inside, (q, q, v, v), strict=True))
+
+
+def _bump(path: DiscretePath, velocity: np.ndarray) -> float:
+    """How far the velocity at a node is at most off the line between its neighbours in time [m/s]."""
+    time = path.fractions
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+    line = (1 - share) * velocity[:-2] + share * velocity[2:]
+    return _most(np.linalg.norm(velocity[1:-1] - line, axis=1))
+
+
+def _most(values: np.ndarray) -> float:
+    """The largest of some numbers, at least 0; NaN if one is."""
+    return float(np.max(values, initial=0.0))
