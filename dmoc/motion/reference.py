@@ -19,6 +19,17 @@ from dmoc.motion.step import weighted
 # The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
 # into a singularity.
 MOST_PARTS = 1_000_000
+# The independent integrator may miss the goal by this part of the path [-] if no tolerance was asked for: a
+# mesh that is too coarse for its motion misses by more.
+MISSED = 1e-2
+
+
+def goal_miss(dynamics: Dynamics, path: DiscretePath, start_time: float) -> tuple[float, float]:
+    """By how much `reference` misses the goal of a path [m] and its velocity there [m/s]."""
+    # A motion that cannot be integrated gives NaN, which no limit lets pass.
+    with np.errstate(invalid="ignore"):
+        q, v = reference(dynamics, path, start_time, path.start_velocity)
+    return float(np.linalg.norm(q - path.position[-1])), float(np.linalg.norm(v - path.goal_velocity))
 
 
 def reference(

@@ -12,7 +12,7 @@ from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
-from dmoc.motion.reference import reference
+from dmoc.motion.reference import goal_miss
 from dmoc.motion.step import step_map
 from dmoc.results.facts import Error
 from dmoc.scene.problem import TransferProblem
@@ -51,11 +51,9 @@ def estimate(
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
     extent, speed = path_scales(path)
-    position, velocity = reference(dynamics, path, problem.start_time, path.start_velocity)
+    miss, slip = goal_miss(dynamics, path, problem.start_time)
     cost += idle_share(dynamics, path)
-    miss = np.linalg.norm(position - path.position[-1]) / extent
-    slip = np.linalg.norm(velocity - path.goal_velocity) / speed
-    return Error(moved, cost, float(max(miss, slip)))
+    return Error(moved, cost, max(miss / extent, slip / speed))
 
 
 def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:

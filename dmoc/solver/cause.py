@@ -41,12 +41,15 @@ class Cause:
     excess : float
         How much more the transfer needs than its limits allow, relative to them [-]; infinite if no limit is
         to blame.
+    zones : bool
+        Whether zones are in the way, of which each alone would have to give way.
     """
 
     path: DiscretePath | None = None
     needs: tuple[str, ...] = ()
     rows: tuple[str, ...] = ()
     excess: float = np.inf
+    zones: bool = False
 
     def words(self) -> str:
         """One line for a person; empty if nothing was found."""
@@ -163,4 +166,4 @@ def _zones(transfer: Relaxable) -> Cause | None:
         if found.feasible and (words := limit.told(found.slack[0])):
             needs.append(words)
             excess = max(excess, float(found.slack[0]))
-    return Cause(needs=tuple(needs), excess=excess) if needs else None
+    return Cause(needs=tuple(needs), excess=excess, zones=True) if needs else None

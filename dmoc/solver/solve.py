@@ -10,6 +10,7 @@ from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
+from dmoc.solver.mended import onto_goal, past_zones
 from dmoc.solver.meshes import first_path
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.tolerance import climb_to_tolerance
@@ -99,9 +100,11 @@ def solve(
             return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
         order = order or (None if best is None else best.nlp.scheme.order)
         first = first_path(problem, order, steps, hold, guess, mesh)
-        if best is not None:
-            return ladder.solution(ladder.refine_on(first, best.pinned))
-        return ladder.solution(ladder.climb_to(first, guess))
+        pinned, given = best is not None and best.pinned, guess
+        rung = ladder.climb_to(first, given) if best is None else ladder.refine_on(first, pinned)
+        is_open = steps is None and mesh is None
+        rung = past_zones(ladder, rung, first, given, is_open)
+        return ladder.solution(onto_goal(ladder, rung, first, given, order, pinned) if is_open else rung)
 
 
 def _tolerance(value: Any) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.guess.open_ends import windings_between
+from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.transcription import check_mesh
@@ -92,9 +93,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
             turned = center + _turned_around(base.position - center, turns * base.fractions)
             position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
-    for i, constraint in enumerate(problem.constraints):
-        for way, bend in constraint.ways_round(base.position, base.fractions):
-            yield f"{way} of {type(constraint).__name__} {i + 1}", replace(base, position=base.position + bend)
+    yield from ways_past(problem, base)
     # The seed is fixed: a second run must find the same optima.
     draw = np.random.default_rng(0)
     extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0

@@ -16,6 +16,7 @@ from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, is_singular, switch_times
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
+from dmoc.solver.mended import past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
 from dmoc.solver.rung import Rung
 
@@ -52,7 +53,7 @@ def climb_to_tolerance(
     the change there tells the error.
     """
     first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
-    trial = ladder.climb_to(first, guess)
+    trial = past_zones(ladder, ladder.climb_to(first, guess), first, guess, refined=True)
     if not trial.solved:
         return ladder.solution(trial, tolerance=tol)
     path = trial.path

@@ -1,0 +1,178 @@
+"""A mended answer: one that cuts zones between nodes, or that an independent integrator does not confirm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.guess.past_zones import clear_ways
+from dmoc.guess.starting import starting_guess
+from dmoc.motion.momenta import end_momenta, node_velocities
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.reference import MISSED, goal_miss
+from dmoc.results.between import Cut, cuts
+from dmoc.solver.ladder import HOPELESS, UNEXPLAINED, Ladder
+from dmoc.solver.meshes import ORDER_OF_UNEVEN, coarse_to_fine, least_steps, rounding_stages, trial_path
+from dmoc.solver.rung import Rung
+
+# At most this many ways past the zones are tried, the shortest first: two sides of four zones.
+MOST_WAYS = 8
+# A mesh on which a zone is cut, or the goal missed, is made finer at most this many times: with twice the steps
+# each time that leaves an eighth of their length.
+MOST_FINER = 3
+# An answer that cuts a zone leaps it if it costs this part more or less on steps of half the length [-]: what
+# only grazes a zone there costs a thousandth more, and a leap ten times as much, as it has half the time.
+ANOTHER = 0.05
+# Answers whose objectives differ by less than this part are one [-]: on one mesh Ipopt finds an optimum to
+# 1e-8.
+SAME_OBJECTIVE = 1e-6
+
+
+def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refined: bool) -> Rung:
+    """An answer that cuts no zone between its nodes, if there is one past the zones; else the answer as it is.
+
+    A path that leaps a zone between two nodes is an optimum of its mesh alone: finer meshes leap faster and
+    dearer. So the problem is solved anew from paths around the zones, on the coarsest mesh. The cheapest of
+    these answers that cuts no zone on the mesh of the first guess is taken; where the number of steps is open
+    (`refined`), steps that cut one are cut in two first. A failure among zones is treated alike.
+    """
+    if rung.stopped or not (_cuts(ladder, rung) if rung.solved else _zones_may_help(ladder, rung)):
+        return rung
+    finer, grazed = _grazed(ladder, rung) if refined and rung.solved else (rung, False)
+    if grazed or finer.stopped:
+        return finer
+    order, meshes = coarse_to_fine(ladder.problem, first)
+    base = starting_guess(ladder.problem, meshes[0], order, first.hold, given)
+    answers = [finer]
+    for way in clear_ways(ladder.problem, base)[:MOST_WAYS]:
+        answers.append(_sharpened(ladder, way))
+        if answers[-1].stopped:
+            return answers[-1]
+    found: list[Rung] = []
+    for one in _distinct(answers):
+        found.append(_cleared(ladder, one, first, refined))
+        if found[-1].stopped:
+            return found[-1]
+        if found[-1].solved and not _cuts(ladder, found[-1]):
+            return found[-1]
+    return min([rung, *found], key=lambda one: _deepest(ladder, one))
+
+
+def _grazed(ladder: Ladder, rung: Rung) -> tuple[Rung, bool]:
+    """The answer with the steps that cut a zone in two; whether that makes it clear at about the same cost."""
+    for _ in range(MOST_FINER):
+        path, before = rung.path, _cost(rung)
+        finer = ladder.refine_on(path.onto(_halved(path.mesh, _cuts(ladder, rung)), path.order, path.hold))
+        if not finer.solved:
+            return finer if finer.stopped else rung, False
+        rung = finer
+        if abs(_cost(rung) - before) > ANOTHER * abs(before):
+            return rung, False
+        if not _cuts(ladder, rung):
+            return rung, True
+    return rung, False
+
+
+def _distinct(answers: list[Rung]) -> list[Rung]:
+    """Those that were solved and differ in what they cost, the cheapest first."""
+    solved = sorted((one for one in answers if one.solved), key=_cost)
+    last, found = np.inf, []
+    for one in solved:
+        if not np.isclose(_cost(one), last, rtol=SAME_OBJECTIVE, atol=0.0):
+            found.append(one)
+        last = _cost(one)
+    return found
+
+
+def _cleared(ladder: Ladder, rung: Rung, first: DiscretePath, refined: bool) -> Rung:
+    """An answer on the mesh of the first guess, with the steps that still cut a zone in two if `refined`."""
+    if len(rung.nlp.mesh) < len(first.mesh):
+        rung = ladder.refine_on(rung.path.onto(first.mesh, first.order, first.hold))
+    for _ in range(MOST_FINER if refined else 0):
+        if not (left := _cuts(ladder, rung)):
+            break
+        finer = ladder.refine_on(rung.path.onto(_halved(rung.path.mesh, left), first.order, first.hold))
+        if not finer.solved:
+            return finer if finer.stopped else rung
+        rung = finer
+    return rung
+
+
+def onto_goal(
+    ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, order: int | None, pinned: bool = False
+) -> Rung:
+    """An answer that an independent integrator confirms, if need be from the same guess on a finer mesh.
+
+    On a mesh that is too coarse for its motion the optimum is one of the mesh alone, and no guess for a finer
+    one. `order` is None where it is open, and then no less than 4.
+    """
+    path, steps = first, len(first.mesh) - 1
+    for _ in range(MOST_FINER):
+        if rung.stopped or not rung.solved or not misses_goal(ladder, rung.path):
+            break
+        if order is None and path.order == 2 and not path.hold:
+            path, steps = path.onto(path.mesh, ORDER_OF_UNEVEN, path.hold), steps // 2
+        steps = 2 * max(steps, least_steps(ladder.problem, first))
+        path = trial_path(ladder.problem, path.order, steps, path.hold, given)
+        finer = ladder.refine_on(path, pinned) if path.multipliers else ladder.climb_to(path, given)
+        rung = finer if finer.solved or finer.stopped else rung
+    return rung
+
+
+def misses_goal(ladder: Ladder, path: DiscretePath) -> bool:
+    """Whether an independent integrator misses the goal by more than a check allows without a tolerance."""
+    _, extent, speed = _velocity(ladder, path)
+    miss, slip = goal_miss(ladder.dynamics, path, ladder.problem.start_time)
+    return not max(miss / extent, slip / speed) <= MISSED
+
+
+def _sharpened(ladder: Ladder, guess: DiscretePath) -> Rung:
+    """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
+    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+        rung = ladder.try_on(guess, width)
+        if not rung.solved:
+            break
+        guess = rung.path
+    return rung
+
+
+def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
+    """Whether a failure may be one of the way past zones, and not of limits that are far too small."""
+    if rung.answer.status not in UNEXPLAINED or any("max_" in name for name in ladder.options or ()):
+        return False
+    cause = rung.cause
+    return cause is None or cause.zones or not HOPELESS < cause.excess < np.inf
+
+
+def _deepest(ladder: Ladder, rung: Rung) -> float:
+    """The deepest cut over the one that is allowed [-]; infinite for what was not solved."""
+    return max((cut.value / cut.allowed for cut in _cuts(ladder, rung)), default=0.0) if rung.solved else np.inf
+
+
+def _cost(rung: Rung) -> float:
+    return rung.problem.objective.sense * rung.level.objective
+
+
+def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
+    """What cuts deeper between nodes than is allowed."""
+    constraints = ladder.problem.constraints
+    if not constraints or not rung.solved:
+        return []
+    path = rung.path
+    return [cut for cut in cuts(constraints, path, *_velocity(ladder, path)) if len(cut.steps)]
+
+
+def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:
+    """Velocities at the nodes [m/s], and the scales of a path, its extent [m] and its largest speed [m/s]."""
+    _, ends = end_momenta(ladder.dynamics, path, ladder.problem.start_time)
+    extent = path.diagonal or 1.0
+    speed = max(float(np.linalg.norm(ends, axis=1).max()), extent / path.duration)
+    return node_velocities(path, ends), extent, speed
+
+
+def _halved(mesh: np.ndarray, left: list[Cut]) -> np.ndarray:
+    """The mesh with the steps that cut a zone, and their neighbours, cut in two."""
+    steps = np.unique(np.concatenate([cut.steps for cut in left])[:, None] + [-1, 0, 1])
+    steps = steps[(steps >= 0) & (steps < len(mesh) - 1)]
+    return np.sort(np.append(mesh, 0.5 * (mesh[steps] + mesh[steps + 1])))
