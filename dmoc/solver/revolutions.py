@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.open_ends import end_estimates
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.motion.lobatto import scheme
@@ -124,6 +125,10 @@ def _durations(problem: TransferProblem) -> list[float]:
         return []
     rate = problem.attraction.rates(places).max() / (2 * np.pi)
     if longest * rate < HALF_ROUND or (longest - shortest) * rate < NO_CHOICE:
+        return []
+    # To an orbit as a whole many revolutions cost much the same, and each sounding takes long.
+    anchored = problem.start.anchored and problem.goal.anchored
+    if not anchored and longest * rate > MANY_TURNS:
         return []
     count = int(np.clip(np.ceil((longest - shortest) * rate / SPACING) + 1, 2, MOST_TRIED))
     return np.linspace(shortest, longest, count).tolist()

@@ -238,10 +238,10 @@ def test_a_rocket_at_its_speed_limit():
     assert certified(rocket()).objective == pytest.approx(rocket_time(), rel=1e-5)
 
 
-@pytest.mark.parametrize("order, rel", [(2, 2e-4), (4, 2e-4)])
-def test_goddard_in_space(order, rel):
+@pytest.mark.parametrize("order", [pytest.param(2, marks=pytest.mark.slow), 4])
+def test_goddard_in_space(order):
     """Orders 2, 4, 6 give 0.60028, 0.60033, 0.60035: they close in on 0.6003."""
-    assert certified(goddard_in_space(), order=order).objective == pytest.approx(0.60035, rel=rel)
+    assert certified(goddard_in_space(), order=order).objective == pytest.approx(0.60035, rel=2e-4)
 
 
 @pytest.mark.parametrize("slope, fuel", [(0.0, 387.9), (4.0, 399.5)])
