@@ -53,6 +53,16 @@ def settings_for(
         if len(mesh) > 1000:
             settings["ipopt.mumps_pivot_order"] = 5
     settings |= _barrier(problem, warm, carried)
+    if (
+        problem.limited
+        and not warm
+        and problem.actuator.smoothing is None
+        and _turns(problem) > VERY_MANY_TURNS
+    ):
+        # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions, and
+        # over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
+        near = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mu_init")
+        settings |= {f"ipopt.{name}": 1e-6 for name in near}
     if warm:
         # Values interpolated from a coarser mesh break the equations: from 1e-8 away from a limit the first
         # steps would be cut short. A distance of 1e-3 takes 1,173 iterations, not 1,309, on the last meshes of

@@ -115,3 +115,10 @@ def test_whatever_the_phase_the_default_guess_is_next_to_a_good_optimum(duration
     found = solve(load_problem("orbit_raise").make(duration=duration), order=8, steps=32).raise_for_status()
     assert found.objective == pytest.approx(seen[duration], rel=1e-3)
     assert found.iterations < 25
+
+
+def test_coarse_meshes_follow_the_revolutions():
+    """With four steps a revolution on the first mesh a hundred of them took it 1,000 iterations for nothing."""
+    solution = solve(make("geo_raise", revolutions=100.0)).raise_for_status()
+    assert solution.ladder[0].steps >= 9.9 * 100
+    assert sum(level.iterations for level in solution.ladder) <= 100
