@@ -59,8 +59,8 @@ def settings_for(
         and problem.actuator.smoothing is None
         and _turns(problem) > VERY_MANY_TURNS
     ):
-        # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions, and
-        # over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
+        # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions,
+        # and over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
         near = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mu_init")
         settings |= {f"ipopt.{name}": 1e-6 for name in near}
     if warm:
