@@ -32,6 +32,7 @@ ELSEWHERE = {
     "python scripts/references.py --readme": "tests/scene/test_problems.py holds every row",
     "python scripts/effects_cost.py --readme": "it writes the README; a test of the studies runs it",
     "python scripts/accuracy.py --readme": "it writes the README, in minutes",
+    "python scripts/campaign.py --readme": "it writes the README; tests/verification/test_campaign.py runs it",
     "python scripts/gallery.py": "it writes the pictures; tests/scene/test_problems.py solves every problem",
 }
 

@@ -1,0 +1,1 @@
+"""The random campaign: scenes that are feasible (or not) by construction, and a judge that knows no dmoc."""
