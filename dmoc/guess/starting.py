@@ -53,14 +53,16 @@ def starting_guess(
     duration = duration or guess_duration(problem)
     if given is None and (best := _least_effort(problem, mesh, order, hold, duration)) is not None:
         return best
-    spiral = False
+    places = len(mesh) - 1 if hold else len(fractions)
+    control, spiral = np.zeros((places, problem.controls)), False
     if given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)
     else:
         position = _given_path(problem, given, duration, fractions)
         ends = _end_states(problem, duration)[1::2]
-        # A smooth path around an attractor gives forces, and through them multipliers, to start from.
-        spiral = callable(given) and problem.attraction.lone is not None
+        if not callable(given) and len(given) == 3:
+            at = 0.5 * (mesh[1:] + mesh[:-1]) if hold else fractions
+            control = _given_controls(problem, given, problem.start_time + duration * at)
     if not np.isfinite(position).all():
         node = int(np.argmin(np.isfinite(position).all(axis=1)))
         raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
@@ -69,9 +71,8 @@ def starting_guess(
     for end, place in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
-    controls = (len(mesh) - 1 if hold else len(fractions), problem.controls)
     mass = np.full(len(fractions), problem.mass)
-    guess = DiscretePath(mesh, order, hold, duration, position, np.zeros(controls), mass, *ends)
+    guess = DiscretePath(mesh, order, hold, duration, position, control, mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
@@ -180,20 +181,33 @@ def _given_path(problem: TransferProblem, given: Any, duration: float, fractions
         if callable(given):
             position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times])
         else:
-            known, values = (np.asarray(part, float) for part in given)
+            known, values = (np.asarray(part, float) for part in given[:2])
             values = values.reshape(len(known), -1)
             if not (np.isfinite(known).all() and (np.diff(known) > 0).all()):
                 raise ValueError("its times do not increase")
             position = np.stack([np.interp(times, known, column) for column in values.T], axis=1)
     except Exception as error:  # whatever a user's function raises
         raise ValueError(
-            "guess must be a function of time [s] that gives positions [m], a pair (times, positions) or a "
-            f"former solution; {short(given)} fails: {' '.join(str(error).split())[:120]}"
+            "guess must be a function of time [s] that gives positions [m], arrays (times, positions) or "
+            f"(times, positions, controls), or a former solution; {short(given)} fails: "
+            f"{' '.join(str(error).split())[:120]}"
         ) from error
     if position.shape != (len(fractions), problem.dimension):
         found = position.shape[-1] if position.ndim == 2 else f"{position.ndim - 1} times nested"
         raise ValueError(f"guess has {found} axes but the problem has {problem.dimension}")
     return position
+
+
+def _given_controls(problem: TransferProblem, given: Any, times: np.ndarray) -> np.ndarray:
+    """The controls of a guess (times, positions, controls) at other times."""
+    known, values = np.asarray(given[0], float), np.asarray(given[2], float)
+    if values.shape != (len(known), problem.controls) or not np.isfinite(values).all():
+        raise ValueError(
+            f"guess has controls of shape {values.shape} but needs finite numbers of shape "
+            f"{(len(known), problem.controls)}: one row a time, "
+            f"with {', '.join(problem.actuator.labels(problem.dimension))}"
+        )
+    return np.stack([np.interp(times, known, column) for column in values.T], axis=1)
 
 
 def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:

@@ -47,8 +47,9 @@ class TransferProblem:
     constraints : sequence of Constraint
         Limits that the path keeps all along the way.
     guess : callable, tuple of arrays or Solution, optional
-        Starting guess of the path: a function of the time [s] that gives the position [m], a pair
-        (times, positions) of shapes (count,) and (count, dimension), or a former solution.
+        Starting guess of the path: a function of the time [s] that gives the position [m], arrays
+        (times, positions) or (times, positions, controls) of shapes (count,), (count, dimension) and
+        (count, controls), or a former solution.
     start_time : float
         Time at the start [s].
     name, parameters

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.open_ends import end_estimates
-from dmoc.guess.starting import controls_for, starting_guess
+from dmoc.guess.starting import controls_for, guess_duration, starting_guess
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -30,6 +30,8 @@ MOST_TRIED = 16
 NO_CHOICE = 0.1
 # A body that cannot go half round in the longest duration, as on an ascent, has no revolutions to choose.
 HALF_ROUND = 0.5
+# To an orbit as a whole, durations up to this many times the likely one are tried.
+LONG = 4.0
 # Of two answers whose costs differ by less than this part [-] the shorter one is taken.
 ALIKE = 1e-3
 # The least effort of a duration is found on at least this many steps of order 6, and on at most five times as
@@ -124,11 +126,14 @@ def _durations(problem: TransferProblem) -> list[float]:
     if not np.isfinite(places).all():
         return []
     rate = problem.attraction.rates(places).max() / (2 * np.pi)
+    if not (problem.start.anchored and problem.goal.anchored):
+        # To an orbit as a whole more revolutions than are likely cost much the same, and the soundings
+        # of many take long.
+        likely = guess_duration(problem)
+        longest = min(longest, LONG * likely)
+        if likely * rate > MANY_TURNS:
+            return []
     if longest * rate < HALF_ROUND or (longest - shortest) * rate < NO_CHOICE:
-        return []
-    # To an orbit as a whole many revolutions cost much the same, and each sounding takes long.
-    anchored = problem.start.anchored and problem.goal.anchored
-    if not anchored and longest * rate > MANY_TURNS:
         return []
     count = int(np.clip(np.ceil((longest - shortest) * rate / SPACING) + 1, 2, MOST_TRIED))
     return np.linspace(shortest, longest, count).tolist()

@@ -47,7 +47,8 @@ def solve(
     hold : bool
         Forces constant over each step.
     guess
-        Overrides the problem's own guess: function of time, (times, positions), or a Solution.
+        Overrides the problem's own guess: function of time, (times, positions), (times, positions, controls),
+        a DiscretePath or a Solution.
     options : dict
         CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
     progress : callable
