@@ -1,4 +1,4 @@
-"""A guess may be a function, arrays, arrays with controls or a former solution: all lead to the same optimum."""
+"""A guess may be a function, arrays, with controls or not, or a solution: all lead to the same optimum."""
 
 import numpy as np
 import pytest
