@@ -23,7 +23,7 @@ WORTH_TELLING = 1e-5
 class Rung:
     """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure.
 
-    `pinned` says that it kept the duration of its guess, free as that is.
+    `pinned` says that it kept the duration of its guess, free as that is; `notes` tell a user of the way to it.
     """
 
     number: int
@@ -33,6 +33,7 @@ class Rung:
     level: Level
     cause: Cause | None = None
     pinned: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def solved(self) -> bool:
@@ -69,7 +70,8 @@ class Rung:
         if bound is not None:
             other = "shorter" if bound == "shortest" else "longer"
             told = f"the duration ends on its {bound} limit of {lasting(duration, 6)}"
-            return (f"{told}: a {other} one may cost less",)
+            return (*self.notes, f"{told}: a {other} one may cost less")
         if self.gain > WORTH_TELLING:
-            return (f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less",)
-        return ()
+            told = f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less"
+            return (*self.notes, told)
+        return self.notes

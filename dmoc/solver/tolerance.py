@@ -58,6 +58,7 @@ def climb_to_tolerance(
         return ladder.solution(trial, tolerance=tol)
     path = trial.path
     order, reason = (order, "the order as given") if order else _best_order(ladder.problem, trial, tol)
+    reason = "; ".join([*trial.notes, reason])
     begun = trial
     if order != path.order:
         begun = ladder.solve_on(path.onto(with_as_many_nodes(path, order), order, hold))
