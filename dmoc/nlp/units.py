@@ -60,14 +60,21 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
 
 
 def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0) -> float:
-    """About the objective along a guess, with `force` [N] in place of its controls if that is not zero."""
+    """About the objective along a guess, with `force` [N] in place of its controls if that is not zero.
+
+    A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
+    node it grows with the number of steps, so at the ends no more counts than the largest force in between.
+    """
     parts = problem.dimension, problem.objective, problem.actuator
     rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]
     velocity = np.gradient(guess.position[some], times, axis=0)
     nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
-    control = guess.control[np.minimum(nodes, len(guess.mesh) - 2)] if guess.hold else guess.control[some]
+    sizes = np.linalg.norm(guess.control, axis=1)
+    most = sizes[1:-1].max(initial=0.0) or sizes.max()
+    control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
+    control = control[np.minimum(nodes, len(guess.mesh) - 2) if guess.hold else some]
     control = np.full_like(control, force) if force else control
     rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
     end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
