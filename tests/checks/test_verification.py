@@ -276,6 +276,45 @@ def test_ledger_fails_where_work_and_energy_differ():
     assert check.value > 0.01
 
 
+def test_residual_fails_on_another_velocity_at_either_end():
+    """Where a velocity is free no bound holds it: only the momentum of that end tells it from another."""
+    push = State((1, None), (None, 0.5))
+    problem = TransferProblem(2.0, State((0, 0), (None, 0.1)), push, 3.0, effects=[LinearDrag(0.2)])
+    solution = solve(problem, steps=20)
+    assert verify(solution).ok and abs(solution.path.goal_velocity[0]) > 0.01
+    for name, node in (("start_velocity", 0), ("goal_velocity", 20)):
+        report = verify(with_path(solution, **{name: nudged(getattr(solution.path, name), 0, 1e-4)}))
+        # 2 kg are 1e-4 m/s off, in half a step of 0.15 s
+        assert report["residual"].value == pytest.approx(2.0 * 1e-4 / 0.075, rel=1e-3)
+        assert not report["residual"].ok and report["residual"].note == f"at dynamics[{node}].x"
+
+
+def test_bounds_fail_where_a_thrust_is_not_paid_for():
+    solution = solve(BURNING)
+    control = np.array(solution.path.control)
+    node = int(np.argmax(control[:, -1]))
+    control[node, -1] = 0.0
+    evidence = Evidence(with_path(solution, control=control))
+    broken = {excess.name: excess.value for excess in excesses(evidence) if not excess.ok}
+    thrust = np.linalg.norm(control[node, :-1])
+    assert broken["force"] == pytest.approx(thrust) and broken["force between nodes"] > 0.1 * thrust
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_bounds_fail_outside_either_corner_of_a_box(side):
+    """A body that leaves at 1 m/s and is back at rest after T comes 4 T / 27 far: x = t (1 - t / T)^2."""
+    away, free = 8 / 27, TransferProblem(1.0, State((0, 0), (side, 0)), State((0, 0), (0, 0)), 2.0)
+    solution = solve(free, order=4, steps=30)
+    reach = np.sort([-side, side * (away + 0.01)])
+    wide = KeepIn((reach[0], -1), (reach[1], 1))
+    assert verify(solution, replace(free, constraints=[wide])).ok
+    reach = np.sort([-side, side * (away - 0.1)])
+    tight = KeepIn((reach[0], -1), (reach[1], 1))
+    report = verify(solution, replace(free, constraints=[tight]))
+    assert failing(report) == ["bounds"] and report["bounds"].value == pytest.approx(0.1, rel=1e-3)
+    assert "KeepIn 1" in report["bounds"].note
+
+
 def test_bounds_fail_alone_on_a_force_beyond_its_limit():
     """A limit that the found forces keep by 20 %, then one that they break by 20 %."""
     free = made("point_to_point")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dmoc import solve, verify
-from dmoc.results.estimate import rounding_cost
+from dmoc.motion.dynamics import Dynamics
+from dmoc.results.estimate import estimate, rounding_cost
 from dmoc.results.switches import switch_times
 from dmoc.scene.problem_file import load_problem
 
@@ -98,3 +99,26 @@ def test_where_finer_meshes_do_no_better_the_best_one_is_the_answer():
     assert "finer meshes did no better" in found.reason
     assert found.objective == pytest.approx(8.246211251, rel=3 * found.error.largest)
     assert len(found.ladder) < 12 and verify(found).ok
+
+
+@pytest.mark.parametrize("steps", [50, 100])
+def test_the_measured_miss_of_the_goal_counts_however_little_the_meshes_differ(steps):
+    """Two meshes may agree on what both get wrong: the integrator that knows neither of them does not."""
+    solution = solve(load_problem("orbit_raise").make(), order=2, steps=steps)
+    unchanged = [(1e-14, 1e-14), (1e-14, 1e-14)]
+    found = estimate(solution.problem, Dynamics.of(solution.problem), solution.path, unchanged, 16.0)
+    assert max(found.path, found.objective) < 1e-12
+    # order 2 misses the goal of this transfer by 2.7e-3 of the path with 400 steps, 16 times that with 100
+    known = 2.7e-3 * (400 / steps) ** 2
+    assert found.largest == found.goal and 0.5 * known < found.goal < 2 * known
+
+
+def test_the_miss_of_the_goal_counts_in_position_and_in_velocity():
+    """A goal of another velocity, or elsewhere, is a miss of just that size."""
+    solution = solve(load_problem("point_to_point").make(), order=4, steps=10)
+    dynamics, path = Dynamics.of(solution.problem), solution.path
+    slipped = replace(path, goal_velocity=np.add(path.goal_velocity, [0.1, 0, 0]))
+    moved = replace(path, position=np.vstack([path.position[:-1], np.add(path.position[-1], [0.1, 0, 0])]))
+    for other in (slipped, moved):
+        assert estimate(solution.problem, dynamics, other, [(0.0, 0.0)], 16.0).goal > 1e-3
+    assert estimate(solution.problem, dynamics, path, [(0.0, 0.0)], 16.0).goal < 1e-10
