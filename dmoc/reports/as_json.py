@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.plain import finite
+from dmoc.reports.verdict import accuracy
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
@@ -34,6 +35,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
         "build_s": float(solution.build_s),
         "solve_s": float(solution.solve_s),
         "verify_s": float(report.seconds if report else 0.0),
+        "accuracy": accuracy(solution, report) if report else None,
         "checks": {
             check.name: {
                 "value": _float(check.value),

@@ -20,6 +20,7 @@ from rich.text import Text
 from dmoc.basics.digits import lasting
 from dmoc.basics.docstrings import documented, first_line
 from dmoc.reports.ends import goal_words, met_words, start_words
+from dmoc.reports.verdict import verdict_words
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
@@ -157,12 +158,10 @@ def answer(
     """What a solve that succeeded shows: ladder, checks, files, and one line that sums it up."""
     total = solution.build_s + solution.solve_s + report.seconds
     found = f"Solved, a local optimum: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
-    broken = ", ".join(check.name for check in report.checks if not check.ok)
-    well = solution.success and not broken
-    last = Text(found, "green" if well else "yellow")
+    last = Text(found, "green" if solution.success and report.ok else "yellow")
     if not solution.success:
         last.append(f"{solution.status.capitalize()}: {solution.message}. ")
-    last.append(f"Checks that fail: {broken}." if broken else "Every check holds.")
+    last.append(verdict_words(solution, report))
     for warning in solution.warnings:
         last.append(f" Note that {warning}.", "yellow")
     if quiet:
