@@ -45,7 +45,7 @@ class Attractor(NamedTuple):
 
     def place(self, dimension: int) -> np.ndarray:
         """Its place with so many axes [m]."""
-        return np.zeros(dimension) if self.center is None else np.array(self.center)
+        return np.zeros(dimension) if self.center is None else np.array(self.center[:dimension])
 
 
 class Effect(Part, ABC):

@@ -91,7 +91,8 @@ def three_body(mass_ratio: float) -> tuple[Effect, ...]:
     """The circular restricted three-body problem in its turning frame, as a tuple of effects.
 
     Units are canonical: distance of the two primaries 1, their mass 1, rate of the frame 1; the
-    larger stands at (-mass_ratio, 0, 0), the smaller at (1 - mass_ratio, 0, 0).
+    larger stands at (-mass_ratio, 0, 0), the smaller at (1 - mass_ratio, 0, 0). With two axes it is the
+    planar problem.
 
     Parameters
     ----------

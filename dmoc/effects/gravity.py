@@ -55,10 +55,13 @@ class PointGravity(Conservative):
 
     def check_dimension(self, dimension: int) -> None:
         if self.center is not None:
-            matching_length(self, "center", len(self.center), dimension)
+            # A centre in the plane of the first axes serves with fewer axes, too.
+            beyond = any(self.center[dimension:])
+            given = len(self.center) if beyond else min(len(self.center), dimension)
+            matching_length(self, "center", given, dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        offset = q if self.center is None else q - ca.DM(self.center)
+        offset = q if self.center is None else q - ca.DM(self.center[: q.shape[0]])
         # a square root and products, since a power of 3/2 takes longer than all the rest of a step
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 

@@ -83,7 +83,9 @@ def _arguments(effect: Effect, state: list[np.ndarray]) -> str:
     """The arguments that an effect depends on, in words; the distance to its centre alone where that is 0."""
     position = state[1]
     center = getattr(effect, "center", None)
-    offset = position - (np.zeros(len(position)) if center is None else np.asarray(center, float))
+    offset = position - (
+        np.zeros(len(position)) if center is None else np.asarray(center, float)[: len(position)]
+    )
     symbols = state_symbols(len(position))
     value = effect.lagrangian(*symbols) if isinstance(effect, Conservative) else effect.force(*symbols)  # type: ignore[attr-defined]
     looks = [ca.depends_on(ca.SX(value), symbol) for symbol in symbols]
