@@ -48,8 +48,8 @@ def inside(module, names):
             found.add(longer)
         elif module:
             found.add(module)
-        elif name in dmoc._HOME_OF:
-            found.add(dmoc._HOME_OF[name].removeprefix("dmoc."))
+        elif name in dmoc._homes():
+            found.add(dmoc._homes()[name].removeprefix("dmoc."))
     return found
 
 

@@ -1,5 +1,5 @@
 """python -m dmoc.cli"""
 
-from dmoc.cli.app import main
+from dmoc.cli import main
 
 main()

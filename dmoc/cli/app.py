@@ -13,9 +13,9 @@ from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
 from dmoc.cli import study as study_command
 from dmoc.cli import sweep as sweep_command
+from dmoc.cli.ending import INTERRUPTED
 from dmoc.cli.options import (
     BAD_INPUT,
-    INTERRUPTED,
     NOT_SOLVED,
     SAVED,
     SOLVED,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from dmoc.basics.plain import unbroken
+from dmoc.cli.ending import INTERRUPTED, end
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ BAD_INPUT = 2
 NOT_SOLVED = 3
 # Exit code where an optimum was found but a check of it fails.
 CHECK_FAILED = 4
-# Exit code after Ctrl-C: 128 and the number of the signal, as shells have it.
-INTERRUPTED = 130
 
 
 def names_like(begun: str) -> list[str]:
@@ -222,13 +221,6 @@ def ends_at_once() -> Iterator[None]:
 
     CasADi would swallow the exception. Nothing is being written here, so nothing is left behind.
     """
-
-    def end(number: int, frame: Any) -> NoReturn:
-        if sys.stderr.isatty():
-            sys.stderr.write("\r\x1b[2K\x1b[?25h")
-        sys.stderr.write("interrupted\n")
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
 
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler:
