@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 # Times are told in another unit from this least value on [s]: (least value, seconds of the unit, its name), the
 # largest first. Three of a unit is where its own numbers become easier to imagine than those of the one below.
@@ -14,12 +13,12 @@ TIMES = ((3 * 86400.0, 86400.0, "days"), (3 * 3600.0, 3600.0, "h"))
 
 def up(value: float) -> str:
     """Four digits, rounded up, for a number of which less would not be enough."""
-    return _rounded(value, np.ceil)
+    return _rounded(value, math.ceil)
 
 
 def down(value: float) -> str:
     """Four digits, rounded down, for a number of which more would be too much."""
-    return _rounded(value, np.floor)
+    return _rounded(value, math.floor)
 
 
 def time_unit(longest: float) -> tuple[float, str]:
@@ -36,6 +35,6 @@ def lasting(seconds: float, digits: int = 8) -> str:
 def _rounded(value: float, how: Callable[[Any], Any]) -> str:
     if value <= 0:
         return "0"
-    unit = 10.0 ** (np.floor(np.log10(value)) - 3)
+    unit = 10.0 ** (math.floor(math.log10(value)) - 3)
     # A value of a whole number of units must not gain or lose one by the rounding of the division.
     return f"{how(round(value / unit, 2)) * unit:.10g}"

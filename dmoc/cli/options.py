@@ -165,7 +165,8 @@ def show_answer(
         from dmoc.reports import words as report
 
         if solution.optimal and verdict is not None:
-            report.console().print(report.answer(solution, verdict, quiet, written))
+            # A single line stays one, however wide the terminal is.
+            report.console().print(report.answer(solution, verdict, quiet, written), soft_wrap=quiet)
         else:
             report.console().print(report.failure(solution, quiet, written))
     if not solution.optimal:

@@ -19,6 +19,10 @@ LEAST_SAMPLES = 2000
 # From this many revolutions on a guess between two states is an orbit that changes evenly: two coasts that are
 # blended would be off by revolutions. The solver treats such a transfer as one of many revolutions, too.
 MANY_TURNS = 3
+# From this many revolutions on a guess to an open place on an orbit is the path of least effort: with fewer, an
+# orbit that changes evenly leads to the same answer sooner. Coarse meshes and the solver's tolerance follow the
+# revolutions, too, whose rounding adds up.
+VERY_MANY_TURNS = 8
 
 
 def coast(

@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.guess.around import path_around, shortest_flyable
+from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
@@ -18,10 +19,6 @@ from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
 from dmoc.motion.momenta import legendre_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
-
-# From this many revolutions on a guess to an open place on an orbit is the path of least effort: with fewer, an
-# orbit that changes evenly leads to the same answer sooner.
-VERY_MANY_TURNS = 8
 
 
 def starting_guess(

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.scene.problem import TransferProblem
-
-# From this many revolutions on the rounding that revolutions amplify counts.
-VERY_MANY_TURNS = 8
 
 
 def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:

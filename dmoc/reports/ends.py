@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from dmoc.basics.digits import lasting
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from dmoc.results.solution import Solution
     from dmoc.scene.ends import Boundary
     from dmoc.scene.problem import TransferProblem
@@ -34,7 +35,7 @@ def met_words(solution: Solution) -> str:
 
 def _moves(end: Boundary) -> bool:
     """Whether the place of an end is known, but only at a given time."""
-    return end.anchored and bool(np.isnan(end.fixed()[0]).any())
+    return end.anchored and any(map(math.isnan, end.fixed()[0]))
 
 
 def _places(end: Boundary, times: Sequence[float]) -> str:

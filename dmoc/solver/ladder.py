@@ -64,6 +64,11 @@ class Ladder:
         self._rungs: list[Rung] = []
         self._levels: list[Level] = []
 
+    @property
+    def rungs(self) -> tuple[Rung, ...]:
+        """All attempts so far, in their order."""
+        return tuple(self._rungs)
+
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
         """The answer on the mesh of a first guess, by way of coarser meshes unless it has multipliers.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.coast import MANY_TURNS
+from dmoc.guess.coast import MANY_TURNS, VERY_MANY_TURNS
 from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
@@ -42,7 +42,8 @@ MOST_COARSE = 400
 # A coarse mesh of order 2 has at least this many steps times n^1.5 for n revolutions: its phase is then roughly
 # right.
 IN_PHASE = 50
-# A coarse mesh of higher order has at least this many steps a revolution: with fewer its optima are others.
+# A coarse mesh of higher order has at least this many steps a revolution where there are very many: with fewer
+# its optima are others.
 COARSE_TURN = {4: 16, 6: 10, 8: 6}
 # The rounding of |F| on the coarsest mesh is this part of the largest thrust [-].
 WIDEST_ROUNDING = 1e-2
@@ -142,7 +143,8 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
     counts, least = [(len(final) - 1) * (first.order // 2)], COARSEST_NODES[limited]
     if counts[0] > 2 * least:
         turns = angle_around(problem, first) / (2 * np.pi)
-        in_phase = IN_PHASE * turns**1.5 if order == 2 else order // 2 * COARSE_TURN[order] * turns
+        a_turn = order // 2 * COARSE_TURN[order] if order > 2 and turns > VERY_MANY_TURNS else 0
+        in_phase = IN_PHASE * turns**1.5 if order == 2 else a_turn * turns
         least = max(least, order // 2 * least_steps(problem, first), int(in_phase))
     while counts[-1] > 2 * least:
         counts.append(max(least, -(-counts[-1] // FINER[limited])) if order == first.order else least)

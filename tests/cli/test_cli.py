@@ -111,7 +111,7 @@ def test_numbers_that_are_not_finite_become_null():
         success, status, warnings, order, steps, iterations = False, "diverging", (), 2, 4, 7
         message, worst = "start elsewhere", (("goal.x", float("nan"), "m"),)
         objective, duration, final_mass = float("nan"), float("inf"), 1.0
-        build_s, solve_s, position = 0.1, 0.2, [0] * 5
+        build_s, solve_s, position, error = 0.1, 0.2, [0] * 5, None
 
         def require_problem(self):
             return self.problem
@@ -142,7 +142,7 @@ def test_a_failed_solve_exits_3_names_the_worst_rows_and_what_to_try(run, folder
 
 def test_the_worst_rows_of_each_unit_are_shown_largest_first(run):
     code, out, _ = run("solve", "free_flyer", "--steps", 100, "--set", "duration=10")
-    assert code == 3 and out.startswith("Meshes, coarse to fine\norder")
+    assert code == 3 and out.startswith("Meshes, coarse to fine\n")
     sizes = [float(size) for size in re.findall(r"^dynamics\[\d+\]\.[xyz] +(\S+) N *$", out, re.M)]
     assert len(sizes) > 5 and sizes == sorted(sizes, reverse=True) and sizes[0] > sizes[-1]
 

@@ -11,8 +11,10 @@ import pytest
 import dmoc
 
 SCRIPTS = Path(dmoc.__file__).parents[1] / "scripts"
-# Scenes a family, and the share of all that may be red [-]: the claim is nearly always.
-EACH, RED = 10, 0.1
+# So many scenes of each family are solved.
+EACH = 10
+# At most this share of them may be red [-]: the claim is nearly always.
+RED = 0.1
 
 
 @pytest.fixture(scope="module")
