@@ -31,7 +31,7 @@ README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- campaign -->\n).*?(?=<!-- end of campaign -->)", re.DOTALL)
 HEAD = "| scenes | number | green | red | wrong | median s | worst s |\n|---|---|---|---|---|---|---|\n"
 # Seconds after which a solve ends with what it has: a scene that takes longer counts as red.
-LONGEST = 30.0
+LONGEST = 12.0
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "free space": plain.free_space,
     "gravity and air": plain.falling,
