@@ -64,6 +64,9 @@ if TYPE_CHECKING:
     from dmoc.parts.objectives import WeightedSum as WeightedSum
     from dmoc.parts.rows import Row as Row
     from dmoc.parts.speed import SpeedLimit as SpeedLimit
+    from dmoc.parts.turning import Thrusters as Thrusters
+    from dmoc.parts.turning import Torque as Torque
+    from dmoc.parts.turning import Wrench as Wrench
     from dmoc.parts.zones import ApproachCone as ApproachCone
     from dmoc.parts.zones import KeepIn as KeepIn
     from dmoc.parts.zones import KeepOut as KeepOut
@@ -76,6 +79,9 @@ if TYPE_CHECKING:
     from dmoc.scene.ends import State as State
     from dmoc.scene.orbits import CircularOrbit as CircularOrbit
     from dmoc.scene.orbits import Orbit as Orbit
+    from dmoc.scene.poses import Attitude as Attitude
+    from dmoc.scene.poses import Pose as Pose
+    from dmoc.scene.poses import rotation as rotation
     from dmoc.scene.problem import TransferProblem as TransferProblem
     from dmoc.solver.solve import solve as solve
     from dmoc.studies.accuracy import Formulation as Formulation

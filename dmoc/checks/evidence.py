@@ -8,13 +8,22 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.configuration import speeds_in
+from dmoc.motion.dynamics import Dynamics, point_function
 from dmoc.motion.flown import Flown, flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, step_nodes
-from dmoc.motion.momenta import end_momenta, legendre_momenta, node_velocities, step_matrices
-from dmoc.results.solution import Solution
+from dmoc.motion.momenta import (
+    along_path,
+    end_momenta,
+    legendre_momenta,
+    node_velocities,
+    step_matrices,
+    velocity_along,
+)
+from dmoc.motion.path import Scales, path_scales
+from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
 # The rounding error of a number counts as ten times the smallest relative one [-]: several additions lie
@@ -35,9 +44,10 @@ class Evidence:
         self.ends = slice(None, None, self.rule.degree)
         self.weights = self.path.duration * node_weights(self.path.mesh, self.rule)
         self.position, self.mass = self.path.position, self.path.mass
-        self.force = force_of(self.dynamics, self.path.control)
+        self.wrench = force_of(self.dynamics, self.path)
         self.momenta = legendre_momenta(self.dynamics, self.path, self.begin)
         self.momentum, self.velocity = end_momenta(self.dynamics, self.path, self.begin, self.momenta)
+        self.speeds = speeds_in(self.path.parts)
 
     def undefined(self) -> str:
         """The names of the arrays that hold a number that is not finite; empty if there is none."""
@@ -56,15 +66,16 @@ class Evidence:
 
     def misreported(self) -> float:
         """How far velocity, momentum and force of the solution are off those of its path [-]."""
-        solution, largest = self.solution, self.largest or 1.0
-        reports = (
-            (solution.velocity, self.velocity, self.speed),
-            (solution.momentum, self.momentum, np.abs(self.momentum).max() or 1.0),
-            (solution.force, self.force, largest),
-        )
-        if any(np.shape(reported) != true.shape for reported, true, _ in reports):
-            return np.inf
-        return float(np.max([np.abs(reported - true).max() / scale for reported, true, scale in reports]))
+        true = reported(self.path, self.velocity, self.momentum, self.wrench)
+        floors = {"velocity": self.speed, "rate": self.rate, "force": self.largest, "torque": self.largest_torque}
+        gaps = []
+        for name, values in true.items():
+            told = getattr(self.solution, name)
+            if np.shape(told) != values.shape:
+                return np.inf
+            scale = floors.get(name) or np.abs(values).max(initial=0.0) or 1.0
+            gaps.append(np.abs(told - values).max(initial=0.0) / scale)
+        return float(np.max(gaps))
 
     @cached_property
     def flown(self) -> Flown:
@@ -73,26 +84,42 @@ class Evidence:
 
     @cached_property
     def node_velocity(self) -> np.ndarray:
-        """Velocity at every node: from the momenta at the step ends, of a polynomial with those inside."""
-        return node_velocities(self.path, self.velocity)
+        """dq/dt at every node: from the momenta at the step ends, of a polynomial with those inside."""
+        return node_velocities(self.path, velocity_along(self.dynamics, self.position[self.ends], self.velocity))
 
     @cached_property
-    def point(self) -> tuple[np.ndarray, np.ndarray]:
-        """dl/dq and F/m of the effects at every node, each of shape (nodes, axes) [m/s^2]."""
+    def loads(self) -> tuple[np.ndarray, np.ndarray]:
+        """What potentials and what other effects do at every node along Z(q), each of shape (nodes, freedom).
+
+        Per unit mass: accelerations [m/s^2], then torques in body axes [m^2/s^2].
+        """
+        resting = point_function(self.problem.effects, self.dynamics.configuration, kinetic=False)
         state = self.time[None], self.position.T, self.node_velocity.T, self.mass[None]
-        dldq, _, push = self.dynamics.point(*state)
-        return dldq.full().T, ca.densify(push).full().T
+        dldq, _, push = resting(*state)
+        parts = (ca.densify(part).full().T for part in (dldq, push))
+        pull, work = (along_path(self.dynamics, self.position, part) for part in parts)
+        return pull, work
 
     @property
     def pulls(self) -> np.ndarray:
         """Accelerations by potentials and by other effects at every node, shape (nodes, 2 axes) [m/s^2]."""
-        return np.concatenate(self.point, axis=1)
+        return np.concatenate([load[:, self.speeds] for load in self.loads], axis=1)
 
     def boundary_momentum(self, place: int) -> np.ndarray:
-        """dl/dv of the boundary state at the start (0) or the goal (-1) [m/s]."""
+        """Z' dl/dv of the boundary state at the start (0) or the goal (-1) [m/s], [m^2/s]."""
         velocity = self.path.goal_velocity if place else self.path.start_velocity
         state = self.time[place], self.position[place], velocity, self.mass[place]
-        return self.dynamics.point(*state)[1].full().ravel()
+        return self.dynamics.momentum(*state).full().ravel()
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """What is left of the discrete equations at every node, along Z(q), shape (nodes, freedom)."""
+        rows = np.zeros_like(self.position)
+        np.add.at(rows, self.at, self.momenta)
+        rows = along_path(self.dynamics, self.position, rows)
+        rows[0] += self.boundary_momentum(0)
+        rows[-1] -= self.boundary_momentum(-1)
+        return rows
 
     @cached_property
     def matrices(self) -> np.ndarray:
@@ -107,9 +134,19 @@ class Evidence:
         return float(np.abs(self.force).max(initial=0.0))
 
     @cached_property
+    def largest_torque(self) -> float:
+        """Largest component of the torque used [N m]."""
+        return float(np.abs(self.wrench[:, ~self.speeds]).max(initial=0.0))
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force of the actuator in space axes [N], one row a node or with hold a step."""
+        return self.wrench[:, self.speeds]
+
+    @cached_property
     def acceleration(self) -> float:
         """The largest acceleration in play, of the scene or of the actuator [m/s^2]."""
-        return float(max(np.abs(self.pulls).max(), self.largest / self.mass.min()))
+        return float(max(np.abs(self.pulls).max(initial=0.0), self.largest / self.mass.min()))
 
     @cached_property
     def extent(self) -> float:
@@ -119,7 +156,43 @@ class Evidence:
     @cached_property
     def speed(self) -> float:
         """Largest speed at the step ends [m/s]; at least what crosses the extent in the duration."""
-        return max(float(np.linalg.norm(self.velocity, axis=1).max()), self.extent / self.path.duration)
+        linear = np.linalg.norm(self.velocity[:, self.speeds], axis=1)
+        return max(float(linear.max()), self.extent / self.path.duration)
+
+    @cached_property
+    def turn(self) -> float:
+        """Largest angle by which the body is turned from its start [rad]; 1 rad for one that does not turn."""
+        return path_scales(self.path).turn
+
+    @cached_property
+    def rate(self) -> float:
+        """Largest angular rate at the step ends [rad/s]; at least what makes the turn in the duration."""
+        rates = np.linalg.norm(self.velocity[:, ~self.speeds], axis=1)
+        return max(float(rates.max()), self.turn / self.path.duration)
+
+    @cached_property
+    def spin(self) -> float:
+        """Largest angular momentum per unit mass at the step ends [m^2/s]; at least that of the largest rate."""
+        spins = np.linalg.norm(self.momentum[:, ~self.speeds], axis=1)
+        moment = 0.0 if self.problem.inertia is None else float(np.trace(self.problem.inertia)) / 3
+        return max(float(spins.max()), moment * self.rate / float(self.mass[0])) or 1.0
+
+    @cached_property
+    def torque_scale(self) -> float:
+        """The torque that errors are judged by [N m]: of the actuator, of the scene, or what turns the body."""
+        pulled = [np.abs(load[:, ~self.speeds]).max(initial=0.0) for load in self.loads]
+        scene = float(self.mass.max()) * max(*pulled, self.spin / self.path.duration)
+        return max(self.problem.actuator.torque_limit() or 0.0, self.largest_torque, 1e-3 * scene) or 1.0
+
+    @cached_property
+    def kinetic(self) -> float:
+        """Kinetic energy per unit mass of the largest speed and rate [J/kg]."""
+        return 0.5 * self.speed**2 + (0.0 if self.speeds.all() else 0.5 * self.spin * self.rate)
+
+    @property
+    def scales(self) -> Scales:
+        """The sizes that errors are judged by."""
+        return Scales(self.extent, self.speed, self.turn, self.rate, tuple(self.path.parts))
 
     @cached_property
     def typical_force(self) -> float:
@@ -129,7 +202,7 @@ class Evidence:
     @cached_property
     def rounding(self) -> float:
         """Ten times the rounding error of a position [m]: far from the origin no check can be stricter."""
-        return ROUNDING * float(np.abs(self.position).max())
+        return ROUNDING * float(np.abs(self.path.place).max(initial=0.0))
 
     @cached_property
     def shortest(self) -> float:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.checks.evidence import Evidence
+from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.flown import BREAKS
 from dmoc.results.between import BOUND, cuts
@@ -48,13 +49,14 @@ def excesses(evidence: Evidence) -> list[Excess]:
 def _controls(evidence: Evidence) -> Iterable[Excess]:
     """Limits of the actuator, at the nodes or, with hold, in the steps, and between the nodes as flown."""
     actuator, control = evidence.problem.actuator, evidence.path.control
-    scale = actuator.force_limit() or evidence.largest or 1.0
-    yield Excess("force", _most(actuator.excess(control)), BOUND * scale, "N")
+    scale, unit = actuator.main_limit() or evidence.largest or 1.0, actuator.limit_unit
+    name = "force" if unit == "N" else "torque"
+    yield Excess(name, _most(actuator.excess(control)), BOUND * scale, unit)
     u = ca.SX.sym("u", control.shape[1])
     yield from _row_excess("actuator", actuator.rows(u), [u], [control.T])
-    if actuator.force_limit() is not None and not evidence.path.hold:
+    if actuator.limited and not evidence.path.hold:
         _, between = evidence.flown.sampled(FLOWN_AT)
-        yield Excess("force between nodes", _most(actuator.beyond(between)), (BREAKS + BOUND) * scale, "N")
+        yield Excess(f"{name} between nodes", _most(actuator.beyond(between)), (BREAKS + BOUND) * scale, unit)
     if actuator.dry_mass > 0:
         missing = _most(actuator.dry_mass - evidence.mass)
         yield Excess("dry mass", missing, BOUND * evidence.problem.mass, "kg")
@@ -68,25 +70,25 @@ def _duration_excess(evidence: Evidence) -> Iterable[Excess]:
 
 def _boundary(evidence: Evidence) -> Iterable[Excess]:
     """Entries that are fixed must be met to round-off, conditions to the optimiser's tolerance."""
-    problem, path = evidence.problem, evidence.path
-    t, q, v, m = state_symbols(problem.dimension)
+    problem, path, body = evidence.problem, evidence.path, evidence.dynamics.configuration
+    t, q, _, m = state_symbols(body.size)
+    v = ca.SX.sym("v", body.freedom)
+    places, speeds = places_in(body.blocks), speeds_in(body.blocks)
+    sizes = {"m": evidence.extent, "m/s": evidence.speed, "rad/s": evidence.rate}
     for name, place, velocity in (("start", 0, path.start_velocity), ("goal", -1, path.goal_velocity)):
         end = getattr(problem, name)
-        for kind, wanted, have, allowed, unit in (
-            (
-                "position",
-                end.fixed()[0],
-                evidence.position[place],
-                FIXED * evidence.extent + evidence.rounding,
-                "m",
-            ),
-            ("velocity", end.fixed()[1], velocity, FIXED * evidence.speed, "m/s"),
+        position = evidence.position[place] - end.fixed()[0]
+        slip = velocity - end.fixed()[1]
+        for kind, off, allowed, unit in (
+            ("position", position[places], FIXED * evidence.extent + evidence.rounding, "m"),
+            ("velocity", slip[speeds], FIXED * evidence.speed, "m/s"),
+            ("attitude", position[~places], FIXED, "-"),
+            ("rate", slip[~speeds], FIXED * evidence.rate, "rad/s"),
         ):
-            yield Excess(f"{name} {kind}", _most(np.abs(have - wanted)[~np.isnan(wanted)]), allowed, unit)
+            if off.size:
+                yield Excess(f"{name} {kind}", _most(np.abs(off)[~np.isnan(off)]), allowed, unit)
         state = [evidence.time[place], evidence.position[place], velocity, evidence.mass[place]]
-        yield from _row_excess(
-            name, end.rows(t, q, v, m), [t, q, v, m], state, {"m": evidence.extent, "m/s": evidence.speed}
-        )
+        yield from _row_excess(name, end.rows(t, q, v, m), [t, q, v, m], state, sizes)
 
 
 def _row_excess(

@@ -15,9 +15,11 @@ from dmoc.basics.digits import lasting
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
+from dmoc.checks.turning import balance, held_wrench
 from dmoc.motion.dynamics import specific_lagrangian, state_symbols
 from dmoc.motion.march import node_masses, rollout
-from dmoc.motion.reference import MISSED, goal_miss
+from dmoc.motion.momenta import rates_along
+from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
@@ -32,6 +34,11 @@ ROLLOUT = 1e-8
 ROLLOUT_MOST = 1e-3
 # Momentum, mass and the reported arrays may be off by this part of themselves [-]: they are exact sums.
 LEDGER = 1e-8
+# The constraint of the coordinates may be off by this, the length of a quaternion squared by twice its own error
+# [-]: Ipopt meets rows to a tolerance.
+CONSTRAINT = 1e-10
+# A body may turn by less than this between neighbouring nodes [rad]: beyond it the scheme has other solutions.
+TURN_MOST = np.radians(90)
 # The first-order conditions may be off by this part of the objective or the force [-].
 OPTIMALITY = 1e-5
 
@@ -112,11 +119,16 @@ def verify(
         evidence = Evidence(solution)
         undefined = evidence.undefined()
         wanted = [*CHECKS.items(), *_own(more)]
-        checks = tuple(
-            Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
+        found = [
+            (name, Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}"))
             if undefined
-            else of_kind(f"what the check {name!r} gives", check(evidence), Check)
+            else (name, check(evidence))
             for name, check in wanted
+        ]
+        checks = tuple(
+            of_kind(f"what the check {name!r} gives", check, Check)
+            for name, check in found
+            if check is not None or name not in CHECKS
         )
     names = [check.name for check in checks]
     if not undefined and (twice := {name for name in names if names.count(name) > 1}):
@@ -137,41 +149,55 @@ def _residual(evidence: Evidence) -> Check:
 
     In units of length the same row would be h^2 / m times smaller and hide its error.
     """
-    rows = np.zeros_like(evidence.position)
-    np.add.at(rows, evidence.at, evidence.momenta)
-    rows[0] += evidence.boundary_momentum(0)
-    rows[-1] -= evidence.boundary_momentum(-1)
-    defect = np.abs(rows) * (evidence.mass / evidence.weights)[:, None]
-    node, axis = np.unravel_index(np.argmax(defect), defect.shape)
-    scene = np.max(
-        [
-            evidence.mass.max() * np.abs(evidence.pulls).max(),
-            evidence.mass.max() * evidence.speed / evidence.path.duration,
-        ]
-    )
-    scale = np.max([evidence.problem.actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
+    defect = np.abs(evidence.rows) * (evidence.mass / evidence.weights)[:, None]
+    actuator, mass = evidence.problem.actuator, evidence.mass.max()
+    scene = np.max([mass * np.abs(evidence.pulls).max(initial=0.0), mass * evidence.speed / evidence.path.duration])
+    scale = np.max([actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
     # Positions are known to a rounding error of their size: no row can be better than that over h^2.
-    floor = evidence.mass.max() * evidence.rounding / evidence.shortest**2
-    note = f"at dynamics[{node}].{'xyz'[axis]}"
-    return Check.of("residual", defect[node, axis], RESIDUAL * scale + floor, "N", note)
+    floor = mass * evidence.rounding / evidence.shortest**2
+    allowed = np.where(evidence.speeds, RESIDUAL * scale + floor, RESIDUAL * evidence.torque_scale)
+    node, axis = np.unravel_index(np.argmax(defect / allowed), defect.shape)
+    note = f"at dynamics[{node}].{evidence.dynamics.configuration.velocity_names[axis]}"
+    unit = "N" if evidence.speeds[axis] else "N m"
+    return Check.of("residual", defect[node, axis], allowed[axis], unit, note)
+
+
+def _constraint(evidence: Evidence) -> Check | None:
+    """The constraint g(q) = 0 of the coordinates at every node; None where there is none."""
+    lengths = [np.abs(np.sum(q * q, axis=1) - 1) for q in evidence.path.attitudes]
+    if not lengths:
+        return None
+    node = int(np.argmax(lengths[0]))
+    return Check.of("constraint", lengths[0][node], CONSTRAINT, "-", f"|q.q - 1| at node {node}")
 
 
 def _rollout(evidence: Evidence) -> Check:
     """March the scheme from the start; errors that the motion itself amplifies are allowed for in the limit."""
-    begin, n = evidence.boundary_momentum(0), evidence.problem.dimension
+    begin = evidence.boundary_momentum(0)
     q, p = rollout(evidence.dynamics, evidence.path, evidence.begin, evidence.position[0], begin)
-    miss, slip = np.abs(q - evidence.position[evidence.ends]).max(), np.abs(p - evidence.momentum).max()
-    scale = np.repeat([evidence.extent, evidence.speed], n)
-    growth = _amplification(evidence.matrices * scale / scale[:, None])
+    miss = apart(evidence.path.parts, q, evidence.position[evidence.ends])
+    slip, scales = p - evidence.momentum, evidence.scales
+    sizes = np.concatenate([scales.positions, np.where(evidence.speeds, evidence.speed, evidence.spin)])
+    off = np.abs(np.concatenate([miss, slip], axis=1)).max(axis=0)
+    growth = _amplification(evidence.matrices * sizes / sizes[:, None])
     turned = ROUNDING * evidence.acceleration * evidence.path.duration
     floor = (
         evidence.rounding / evidence.extent + (evidence.rounding / evidence.shortest + turned) / evidence.speed
     )
     limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
-    note = f"{miss:.2g} m, {slip:.2g} m/s; path amplifies errors {growth:.2g} times"
-    return Check.of(
-        "rollout", np.max([miss / evidence.extent, slip / evidence.speed]), limit, "of the path", note
-    )
+    note = f"{_misses(evidence, off)}; path amplifies errors {growth:.2g} times"
+    return Check.of("rollout", np.max(off / sizes), limit, "of the path", note)
+
+
+def _misses(evidence: Evidence, off: np.ndarray) -> str:
+    """Errors of position and velocity in words, one entry a freedom each."""
+    moved, slipped = np.split(off, 2)
+    speeds, parts = evidence.speeds, []
+    if speeds.any():
+        parts += [f"{moved[speeds].max():.2g} m", f"{slipped[speeds].max():.2g} m/s"]
+    if not speeds.all():
+        parts.append(f"{np.degrees(np.linalg.norm(moved[~speeds])):.2g} degrees")
+    return ", ".join(parts)
 
 
 def _amplification(matrices: np.ndarray) -> float:
@@ -192,14 +218,14 @@ def _amplification(matrices: np.ndarray) -> float:
 def _reference(evidence: Evidence) -> Check:
     """The equations of motion, integrated without the scheme, meet the goal."""
     miss, slip = goal_miss(evidence.dynamics, evidence.path, evidence.begin)
-    note = f"misses the goal by {miss:.2g} m and {slip:.2g} m/s"
-    return Check.of(
-        "reference",
-        np.max([miss / evidence.extent, slip / evidence.speed]),
-        _accuracy(evidence),
-        "of the path",
-        note,
-    )
+    speeds, told = evidence.speeds, []
+    if speeds.any():
+        told += [f"{np.linalg.norm(miss[speeds]):.2g} m", f"{np.linalg.norm(slip[speeds]):.2g} m/s"]
+    if not speeds.all():
+        turned = np.degrees(np.linalg.norm(miss[~speeds]))
+        told += [f"{turned:.2g} degrees", f"{np.linalg.norm(slip[~speeds]):.2g} rad/s"]
+    note = f"misses the goal by {', '.join(told[:-1])} and {told[-1]}"
+    return Check.of("reference", evidence.scales.share(miss, slip), _accuracy(evidence), "of the path", note)
 
 
 def _accuracy(evidence: Evidence) -> float:
@@ -212,10 +238,7 @@ def _ledger(evidence: Evidence) -> Check:
 
     And the velocities, momenta and forces that the solution reports are those of its path.
     """
-    impulse = evidence.momenta.sum(axis=0)
-    change = evidence.boundary_momentum(-1) - evidence.boundary_momentum(0)
-    gross = np.abs(impulse).sum() + evidence.speed
-    momentum = np.abs(change - impulse.sum(axis=0)).max() / gross
+    momentum, gross = balance(evidence)
     masses = node_masses(evidence.dynamics, evidence.path, evidence.problem.mass)
     mass = np.abs(evidence.mass - masses).max() / evidence.problem.mass
     exact = LEDGER + ROUNDING * evidence.acceleration * evidence.path.duration / gross
@@ -232,23 +255,31 @@ def _ledger(evidence: Evidence) -> Check:
 
 def _energy_gap(evidence: Evidence) -> float | None:
     """Change of energy against work, over the largest of kinetic energy and total work; None if not kept."""
-    t, q, v, m = state_symbols(evidence.problem.dimension)
-    potential = ca.SX(specific_lagrangian(evidence.problem.effects, t, q, v, m))
+    body = evidence.dynamics.configuration
+    t, q, v, m = state_symbols(body.size)
+    potential = ca.SX(specific_lagrangian(evidence.problem.effects, body, t, q, v, m))
     if ca.depends_on(potential, t) or (evidence.dynamics.actuator.burns and ca.depends_on(potential, m)):
         return None
     at = [(evidence.time[i], evidence.position[i], evidence.velocity[i], evidence.mass[i]) for i in (0, -1)]
     change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
-    push = evidence.point[1]
+    parts, push = [], evidence.loads[1]
+    rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
     if not evidence.path.hold:
-        power = (evidence.force / evidence.mass[:, None] + push) * evidence.node_velocity
+        power = (evidence.wrench / evidence.mass[:, None] + push) * rates
         parts = np.sum(power, axis=1) * evidence.weights
+    elif body.surplus:
+        # A held force that is fixed to a turning body turns with it within a step.
+        held = held_wrench(evidence)
+        power = np.einsum("jkn,jkn->k", evidence.rule.weights[:, None, None] * held, rates[evidence.at])
+        work = power * evidence.path.duration * np.diff(evidence.path.mesh)
+        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
     else:
         # The work of a held force is that force times the way of its step.
         moves = np.diff(evidence.position[evidence.ends], axis=0)
         middle = evidence.mass[evidence.at].mean(axis=0)
         work = np.sum(evidence.force * moves, axis=1) / middle
-        parts = np.concatenate([work, np.sum(push * evidence.node_velocity, axis=1) * evidence.weights])
-    return float(abs(change - parts.sum()) / max(0.5 * evidence.speed**2, np.abs(parts).sum()))
+        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
+    return float(abs(change - parts.sum()) / max(evidence.kinetic, np.abs(parts).sum()))
 
 
 def _bounds(evidence: Evidence) -> Check:
@@ -277,12 +308,17 @@ def _stability(evidence: Evidence) -> Check:
         evidence.dynamics, evidence.path, evidence.begin, evidence.velocity, evidence.matrices
     )
     note = f"h omega = {growth.frequency:.2g} at most"
+    turned = evidence.path.largest_turn
+    if turned >= TURN_MOST:
+        note = f"{note}; more than {np.degrees(TURN_MOST):.0f} degrees turned between two nodes"
+        return Check("stability", np.degrees(turned), np.degrees(TURN_MOST), "degrees a node", False, note)
     return Check.of("stability", growth.value, growth.limit, "growth a step", note)
 
 
 # The checks by name, in the order in which a report lists them.
 CHECKS: dict[str, Callable[[Evidence], Check]] = {
     "residual": _residual,
+    "constraint": _constraint,
     "rollout": _rollout,
     "reference": _reference,
     "ledger": _ledger,

@@ -48,8 +48,36 @@ class Attractor(NamedTuple):
         return np.zeros(dimension) if self.center is None else np.array(self.center[:dimension])
 
 
+class Body(NamedTuple):
+    """A body as an effect sees it, all CasADi expressions; a point mass has a position and a velocity alone.
+
+    Attributes
+    ----------
+    position, velocity : column
+        Of the centre of mass [m], [m/s]; without entries where the attitude alone is in the problem.
+    attitude : column or None
+        Unit quaternion from body to space, scalar first.
+    rotation : matrix or None
+        R(q), shape (3, 3), which turns body axes into space axes; a polynomial in the quaternion.
+    rate : column or None
+        Angular rate in body axes [rad/s].
+    inertia : array or None
+        In body axes about the centre of mass [kg m^2], shape (3, 3).
+    """
+
+    position: Any
+    velocity: Any
+    attitude: Any = None
+    rotation: Any = None
+    rate: Any = None
+    inertia: Any = None
+
+
 class Effect(Part, ABC):
-    """Something that acts on the body. Derive from `Conservative` or `Force`, never from this.
+    """Something that acts on the body. Derive from one of the four classes below, never from this.
+
+    `Conservative` and `Force` act on its position and see its position and velocity; `BodyConservative` and
+    `BodyForce` see its attitude, too, and may turn it.
 
     Whoever implements an effect
 
@@ -81,6 +109,24 @@ class Effect(Part, ABC):
         """Radius of the body at the origin where it tells one [m], else 0."""
         return 0.0
 
+    def lagrangian_of(self, t: Any, body: Body, m: Any) -> Any:
+        """Contribution to the Lagrangian per unit mass [J/kg]; None where it does work instead."""
+        return None
+
+    def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0."""
+        return None, None
+
+    @property
+    def turns_body(self) -> bool:
+        """Whether it sees the attitude, so that it acts on rigid bodies alone."""
+        return False
+
+    @property
+    def moves_body(self) -> bool:
+        """Whether it needs the position of the body."""
+        return True
+
 
 class Conservative(Effect):
     """An effect that enters the Lagrangian and so keeps the flow symplectic.
@@ -98,6 +144,9 @@ class Conservative(Effect):
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         """Contribution to the Lagrangian per unit mass [J/kg]; 1/2 |v|^2 is already there."""
 
+    def lagrangian_of(self, t: Any, body: Body, m: Any) -> Any:
+        return self.lagrangian(t, body.position, body.velocity, m)
+
 
 class Force(Effect):
     """An effect that does work: drag, radiation pressure and the like.
@@ -111,6 +160,46 @@ class Force(Effect):
     @abstractmethod
     def force(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         """Force on the body [N]."""
+
+    def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        return self.force(t, body.position, body.velocity, m), None
+
+
+class BodyConservative(Effect):
+    """An effect on a rigid body that enters the Lagrangian: a potential of position and attitude.
+
+    Whoever implements one has the duties of a `Conservative`. Its torque follows from the expression: none is
+    written by hand. It must not depend on the rate.
+    """
+
+    @abstractmethod
+    def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
+        """Contribution to the Lagrangian per unit mass [J/kg]."""
+
+    def lagrangian_of(self, t: Any, body: Body, m: Any) -> Any:
+        return self.lagrangian(t, body, m)
+
+    @property
+    def turns_body(self) -> bool:
+        return True
+
+
+class BodyForce(Effect):
+    """An effect on a rigid body that does work, as a force and a torque.
+
+    Whoever implements one has the duties of a `Force`.
+    """
+
+    @abstractmethod
+    def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0."""
+
+    def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        return self.wrench(t, body, m)
+
+    @property
+    def turns_body(self) -> bool:
+        return True
 
 
 def _in_words(value: Any, unit: str) -> str:

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import short
+from dmoc.basics.quaternions import slerp
 from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
+from dmoc.guess.turning import as_point, checked_turning, joined, turning_duration, turning_states
+from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -40,6 +43,8 @@ def starting_guess(
     """
     given = problem.guess if given is None else given
     given = getattr(given, "path", given)
+    if problem.inertia is not None:
+        return _turning_guess(problem, mesh, order, hold, given, duration)
     if isinstance(given, DiscretePath):
         if given.position.shape[1] != problem.dimension:
             raise ValueError(
@@ -73,6 +78,40 @@ def starting_guess(
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
+def _turning_guess(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any, duration: float | None
+) -> DiscretePath:
+    """The guess of a body that turns."""
+    body = configuration_of(problem)
+    if isinstance(given, DiscretePath):
+        if tuple(given.parts) != tuple(body.blocks):
+            raise ValueError(
+                f"guess has {given.position.shape[1]} coordinates but the problem has {body.size}: "
+                f"{', '.join(body.names)}"
+            )
+        return given.onto(mesh, order, hold)
+    fractions, moves = node_fractions(mesh, scheme(order)), problem.start.has_position
+    point = as_point(problem) if moves else None
+    likely = turning_duration(problem)
+    if point is not None and problem.free_duration and problem.actuator.limited:
+        likely = max(likely if problem.actuator.turning_limit() else 0.0, guess_duration(point))
+    duration = duration or likely
+    control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
+    q0, w0, q1, w1 = turning_states(problem, duration)
+    if given is not None:
+        position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
+        place = None
+        ends = (w0, w1)
+        if point is not None:
+            linear = starting_guess(point, mesh, order, hold, None, duration)
+            ends = (np.append(linear.start_velocity, w0), np.append(linear.goal_velocity, w1))
+    else:
+        position = slerp(q0, q1, fractions)
+        ends = (w0, w1)
+        place = None if point is None else starting_guess(point, mesh, order, hold, None, duration)
+    return joined(problem, place, (mesh, order, hold, duration, position, ends, control))
+
+
 def _least_effort(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
 ) -> DiscretePath | None:
@@ -104,7 +143,7 @@ def _least_effort(
 
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
     """About the angle that a path turns through around all attractors [rad]."""
-    rates = problem.attraction.rates(guess.position)
+    rates = problem.attraction.rates(guess.place)
     return float(np.trapezoid(rates, guess.duration * guess.fractions))
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 
 from dmoc.basics.memory import remembered_property
-from dmoc.effects.base import Conservative, Effect, Force
-from dmoc.motion.configuration import Configuration, Translation
+from dmoc.effects.base import Effect
+from dmoc.motion.configuration import Configuration, configuration_of
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.forces import FreeForce
 
@@ -27,7 +27,7 @@ class Dynamics:
     def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:
         """The dynamics of a transfer problem, with its own effects or with others in their place."""
         return cls(
-            Translation(problem.dimension), problem.effects if effects is None else effects, problem.actuator
+            configuration_of(problem), problem.effects if effects is None else effects, problem.actuator
         )
 
     @property
@@ -43,11 +43,17 @@ class Dynamics:
     @property
     def controls(self) -> int:
         """Number of controls at a node."""
-        return self.actuator.size(self.configuration.size)
+        return self.actuator.size(self.configuration.dimension)
 
     def symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         """Symbols t, q, v, m."""
         return state_symbols(self.positions)
+
+    def states(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Symbols t, q, w, m, and dq/dt = Z(q) w: for a point mass w and dq/dt are one."""
+        t, q, _, m = self.symbols()
+        w = ca.SX.sym("w", self.freedom)
+        return t, q, w, m, self.configuration.velocity(q, w)
 
     @remembered_property
     def point(self) -> ca.Function:
@@ -56,36 +62,52 @@ class Dynamics:
 
     @remembered_property
     def energy(self) -> ca.Function:
-        """(t, q, v, m) -> v . dl/dv - l, the energy per unit mass [J/kg]."""
+        """(t, q, w, m) -> v . dl/dv - l, the energy per unit mass [J/kg]."""
         t, q, v, m = self.symbols()
         kinetic = self.configuration.kinetic(q, v, m)
-        lagrangian = kinetic + specific_lagrangian(self.effects, t, q, v, m)
-        return ca.Function("energy", [t, q, v, m], [ca.dot(v, ca.gradient(lagrangian, v)) - lagrangian])
+        lagrangian = kinetic + specific_lagrangian(self.effects, self.configuration, t, q, v, m)
+        energy = ca.Function("energy", [t, q, v, m], [ca.dot(v, ca.gradient(lagrangian, v)) - lagrangian])
+        t, q, w, m, v = self.states()
+        return ca.Function("energy", [t, q, w, m], [energy(t, q, v, m)]) if self.configuration.surplus else energy
+
+    @remembered_property
+    def momentum(self) -> ca.Function:
+        """(t, q, w, m) -> p = Z' dl/dv: momentum [m/s] and spin in body axes [m^2/s], per unit mass."""
+        t, q, w, m, v = self.states()
+        along = self.configuration.along(q, self.point(t, q, v, m)[1])
+        return ca.Function("momentum", [t, q, w, m], [along])
 
     @remembered_property
     def velocity(self) -> ca.Function:
-        """(t, q, p, m) -> v [m/s] that belongs to the momentum p = dl/dv [m/s].
+        """(t, q, p, m) -> w [m/s], [rad/s] that belongs to the momentum p = Z' dl/dv.
 
         Raises
         ------
         ValueError
             If the Lagrangian is not quadratic in the velocity.
         """
-        t, q, v, m = self.symbols()
+        t, q, w, m, _ = self.states()
         p = ca.SX.sym("p", self.freedom)
-        momentum = self.point(t, q, v, m)[1]
-        inertia = ca.jacobian(momentum, v)
-        if ca.depends_on(inertia, v):
+        momentum = self.momentum(t, q, w, m)
+        inertia = ca.jacobian(momentum, w)
+        if ca.depends_on(inertia, w):
             raise ValueError("an effect's lagrangian is not quadratic in the velocity; state it as a Force")
         # The momentum is linear in the velocity: inertia times velocity, plus its value at rest.
-        at_rest = self.point(t, q, ca.DM.zeros(self.positions), m)[1]
+        at_rest = self.momentum(t, q, ca.DM.zeros(self.freedom), m)
         return ca.Function("velocity", [t, q, p, m], [ca.solve(inertia, p - at_rest)])
 
     @remembered_property
     def acceleration(self) -> ca.Function:
-        """(t, q, v, m, f) -> dv/dt [m/s^2] of the continuous motion under an actuator force f [N]."""
-        t, q, v, m = self.symbols()
-        f = ca.SX.sym("f", self.positions)
+        """(t, q, w, m, f) -> dw/dt of the continuous motion under the actuator's f.
+
+        f is a force [N] and, for a rigid body, a torque in body axes [N m] below it. A body turns by Euler's
+        equations, not by the constrained ones of the scheme.
+        """
+        t, q, w, m, v = self.states()
+        f = ca.SX.sym("f", self.freedom)
+        if self.configuration.surplus:
+            rate = self._by_euler(t, q, w, m, f)
+            return ca.Function("acceleration", [t, q, w, m, f], [ca.densify(rate)])
         dldq, dldv, push = self.point(t, q, v, m)
         # The Euler-Lagrange equation d/dt dl/dv = dl/dq + F/m, whose left side is written out by the chain
         # rule.
@@ -93,25 +115,71 @@ class Dynamics:
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
         return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
 
+    def _by_euler(self, t: Any, q: Any, w: Any, m: Any, f: Any) -> Any:
+        """dw/dt of a rigid body: Newton's equation of its centre of mass and Euler's of its rate."""
+        body: Any = self.configuration
+        axes = body.axes
+        _, _, slope, _ = self.symbols()
+        dldq, dldv, push = point_function(self.effects, body, kinetic=False)(t, q, slope, m)
+        if ca.depends_on(dldv[axes:], slope):
+            raise ValueError("a BodyConservative's lagrangian must not depend on the rate; state it as a BodyForce")
+        change = ca.jacobian(dldv[:axes], q) @ slope + ca.jacobian(dldv[:axes], t)
+        inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
+        pulled = dldq + push
+        along = ca.solve(inertia, pulled[:axes] + f[:axes] / m - change) if axes else ca.SX.zeros(0)
+        torque = body.along(q, pulled)[axes:] + f[axes:] / m
+        rates = ca.vertcat(along, body.angular_acceleration(w[axes:], torque, m))
+        return ca.substitute(rates, slope, body.velocity(q, w))
+
     @remembered_property
     def linearised(self) -> tuple[ca.Function, bool]:
-        """(t, q, v, m) -> d(q', v')/d(q, v) of the motion without thrust, and whether it is constant."""
-        t, q, v, m = self.symbols()
-        rate = self.acceleration(t, q, v, m, ca.DM.zeros(self.positions))
-        jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
-        constant = not ca.depends_on(jacobian, ca.vertcat(t, q, v, *([m] if self.actuator.burns else [])))
-        return ca.Function("flow", [t, q, v, m], [ca.densify(jacobian)]), constant
+        """(t, q, w, m) -> slopes of the motion without thrust in (q, w), and whether they are constant.
+
+        For a point mass d(q', v')/d(q, v). For a rigid body attitudes change by a small turn e about the body
+        axes: q moves by Z(q) e, so that de/dt = de' - w x e.
+        """
+        t, q, w, m, v = self.states()
+        rate = self.acceleration(t, q, w, m, ca.DM.zeros(self.freedom))
+        if not self.configuration.surplus:
+            jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
+        else:
+            tangent, turned = self.configuration.tangent(q), ca.SX.sym("e", self.freedom)
+            moving = ca.jacobian(v, q) @ tangent - ca.jacobian(ca.jtimes(tangent @ turned, q, v), turned)
+            inverse = ca.solve(tangent.T @ tangent, tangent.T)
+            above = ca.horzcat(inverse @ moving, ca.SX.eye(self.freedom))
+            below = ca.horzcat(ca.jacobian(rate, q) @ tangent, ca.jacobian(rate, w))
+            jacobian = ca.vertcat(above, below)
+        constant = not ca.depends_on(jacobian, ca.vertcat(t, q, w, *([m] if self.actuator.burns else [])))
+        return ca.Function("flow", [t, q, w, m], [ca.densify(jacobian)]), constant
 
     @remembered_property
     def depends_on_velocity(self) -> bool:
-        """Whether an effect looks at the velocity, so that even a step of order 2 is implicit."""
-        return bool(split_effects(self.effects, self.positions)[1])
+        """Whether a step of order 2 is implicit: an effect looks at the velocity, or the body turns."""
+        return bool(self.configuration.surplus or split_effects(self.effects, self.configuration)[1])
 
     @remembered_property
     def depends_on_time(self) -> bool:
         """Whether the Lagrangian depends on time, so that energy is not to be balanced."""
         t, q, v, m = self.symbols()
-        return bool(ca.depends_on(ca.SX(specific_lagrangian(self.effects, t, q, v, m)), t))
+        lagrangian = specific_lagrangian(self.effects, self.configuration, t, q, v, m)
+        return bool(ca.depends_on(ca.SX(lagrangian), t))
+
+    @remembered_property
+    def wrench(self) -> ca.Function:
+        """(q, u) -> the actuator's force in space axes [N] and, for a rigid body, its torque in body axes [N m]."""
+        q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)
+        force, torque = self.actuator.wrench(self.configuration.rotation(q), u)
+        if not self.configuration.surplus:
+            return ca.Function("wrench", [q, u], [ca.densify(force)])
+        axes = self.freedom - 3
+        parts = [ca.SX.zeros(axes) if force is None or not axes else force]
+        parts.append(ca.SX.zeros(3) if torque is None else torque)
+        return ca.Function("wrench", [q, u], [ca.densify(ca.vertcat(*parts))])
+
+
+def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:
+    """The force of an actuator on the coordinates q [N], [N m]."""
+    return configuration.generalised(q, *actuator.wrench(configuration.rotation(q), u))
 
 
 def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -119,9 +187,11 @@ def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     return ca.SX.sym("t"), ca.SX.sym("q", positions), ca.SX.sym("v", positions), ca.SX.sym("m")
 
 
-def specific_lagrangian(effects: Sequence[Effect], t, q, v, m) -> Any:
-    """Sum of the conservative effects' Lagrangians per unit mass, without 1/2 |v|^2 [J/kg]."""
-    return sum((e.lagrangian(t, q, v, m) for e in effects if isinstance(e, Conservative)), ca.SX(0))
+def specific_lagrangian(effects: Sequence[Effect], configuration: Configuration, t, q, v, m) -> Any:
+    """Sum of the conservative effects' Lagrangians per unit mass, without the kinetic energy [J/kg]."""
+    body = configuration.body(q, v)
+    terms = [effect.lagrangian_of(t, body, m) for effect in effects]
+    return sum((term for term in terms if term is not None), ca.SX(0))
 
 
 def point_function(
@@ -130,24 +200,31 @@ def point_function(
     """(t, q, v, m) -> dl/dq, dl/dv, F/m of these effects, with or without the kinetic energy."""
     size = configuration.size
     t, q, v, m = state_symbols(size)
-    lagrangian = specific_lagrangian(effects, t, q, v, m)
-    push = sum((e.force(t, q, v, m) / m for e in effects if isinstance(e, Force)), ca.SX.zeros(size))
+    lagrangian = specific_lagrangian(effects, configuration, t, q, v, m)
+    push = ca.SX.zeros(size)
+    for effect in effects:
+        force, torque = effect.wrench_of(t, configuration.body(q, v), m)
+        if force is not None or torque is not None:
+            push = push + configuration.generalised(q, force, torque) / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
     change = ca.gradient(lagrangian, q) + moved, ca.gradient(lagrangian, v) + inertia
     return ca.Function("point", [t, q, v, m], [*change, push])
 
 
-def split_effects(effects: Sequence[Effect], positions: int) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+def split_effects(
+    effects: Sequence[Effect], configuration: Configuration
+) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
     """Effects that look only at t, q, m, and those that look at the velocity.
 
     The first are evaluated once a node. The second are evaluated in each of the two steps that share a
     node, since each step has a velocity of its own there.
     """
-    t, q, v, m = state_symbols(positions)
+    t, q, v, m = state_symbols(configuration.size)
+    body = configuration.body(q, v)
 
     def looks_at_velocity(effect: Effect) -> bool:
-        act = effect.lagrangian if isinstance(effect, Conservative) else effect.force  # type: ignore[attr-defined]
-        return ca.depends_on(ca.SX(act(t, q, v, m)), v)
+        acts = [effect.lagrangian_of(t, body, m), *effect.wrench_of(t, body, m)]
+        return any(ca.depends_on(ca.SX(act), v) for act in acts if act is not None)
 
     known = [(looks_at_velocity(effect), effect) for effect in effects]
     return tuple(e for moving, e in known if not moving), tuple(e for moving, e in known if moving)

@@ -72,7 +72,7 @@ def flown(dynamics: Dynamics, path: DiscretePath) -> Flown:
 
 def _broken(dynamics: Dynamics, rule: Scheme, nodes: np.ndarray) -> np.ndarray:
     """Steps whose polynomial breaks the limit between its nodes."""
-    limit = dynamics.actuator.force_limit()
+    limit = dynamics.actuator.main_limit()
     if rule.degree == 1 or limit is None:
         # A straight line between two controls within a convex limit stays within it.
         return np.zeros(nodes.shape[1], bool)
@@ -115,7 +115,7 @@ def _share_within(dynamics: Dynamics, mean: np.ndarray, apart: np.ndarray) -> np
     Shape of `apart` (2, meetings, steps, size), of the result (meetings, steps). Limits are convex, so that
     bisection finds it.
     """
-    allowed = BREAKS * (dynamics.actuator.force_limit() or 0.0)
+    allowed = BREAKS * (dynamics.actuator.main_limit() or 0.0)
 
     def within(share: np.ndarray) -> np.ndarray:
         return _beyond(dynamics, mean + share[..., None] * apart).max(axis=0) <= allowed

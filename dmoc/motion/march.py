@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.motion.configuration import configuration_of, places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
@@ -33,6 +34,10 @@ class Trajectory:
         [m], [m/s].
     momentum : array, shape (steps+1, axes)
         dl/dv, per unit mass [m/s].
+    attitude : array, shape (steps+1, 4), or None
+        Unit quaternion of a rigid body, scalar first, from body to space.
+    rate, spin : arrays, shape (steps+1, 3), or None
+        Angular rate [rad/s] and angular momentum [kg m^2/s] of a rigid body, in body axes.
     mass : array, shape (steps+1,)
         [kg].
     energy : array, shape (steps+1,)
@@ -45,6 +50,9 @@ class Trajectory:
     momentum: np.ndarray
     mass: np.ndarray
     energy: np.ndarray
+    attitude: np.ndarray | None = None
+    rate: np.ndarray | None = None
+    spin: np.ndarray | None = None
 
 
 def simulate(
@@ -99,11 +107,16 @@ def simulate(
     path = replace(path, mass=node_masses(dynamics, path, problem.mass))
     time = problem.start_time + path.duration * path.mesh
     mass = path.mass[:: scheme(path.order).degree]
-    momentum = dynamics.point(time[0], position, velocity, mass[0])[1]
+    momentum = dynamics.momentum(time[0], position, velocity, mass[0])
     q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel(), compensated)
     v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
     energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
-    return Trajectory(time, q, v, p, mass, energy)
+    blocks = dynamics.configuration.blocks
+    places, speeds = places_in(blocks), speeds_in(blocks)
+    trajectory = Trajectory(time, q[:, places], v[:, speeds], p[:, speeds], mass, energy)
+    if places.all():
+        return trajectory
+    return replace(trajectory, attitude=q[:, ~places], rate=v[:, ~speeds], spin=mass[:, None] * p[:, ~speeds])
 
 
 def _path_at_start(
@@ -128,9 +141,9 @@ def _path_at_start(
     )
     position, velocity = problem.start.fixed()
     mass = np.full(nodes, problem.mass)
-    return DiscretePath(
-        mesh, order, hold, longest, np.tile(position, (nodes, 1)), given, mass, velocity, velocity
-    )
+    still = np.tile(position, (nodes, 1))
+    blocks = configuration_of(problem).blocks
+    return DiscretePath(mesh, order, hold, longest, still, given, mass, velocity, velocity, blocks=blocks)
 
 
 def node_masses(dynamics: Dynamics, path: DiscretePath, mass: float) -> np.ndarray:
@@ -160,7 +173,9 @@ def rollout(
     momentum: np.ndarray,
     compensated: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions [m] and momenta per mass [m/s] at the step ends, of shape (steps+1, axes), from the start.
+    """Positions [m] and momenta per mass [m/s] at the step ends, one row an end, from the start.
+
+    Of a body that turns, the coordinates q and Z'p.
 
     Only the mesh, masses and controls of `path` are used, and its first position as the origin.
     """
@@ -168,7 +183,8 @@ def rollout(
     advance, inputs = _advance(dynamics, path, start_time, compensated)
     states = np.zeros((advance.numel_out(0), steps + 1))
     # Positions count from the path's first one: far from the origin their increments would lose digits.
-    states[: 2 * n, 0] = np.concatenate([position - path.position[0], momentum])
+    count_of_states = n + dynamics.freedom
+    states[:count_of_states, 0] = np.concatenate([position - path.position[0], momentum])
     march = advance.mapaccum(min(steps, PIECE))
     for begin in range(0, steps, PIECE):
         count = min(PIECE, steps - begin)
@@ -177,7 +193,7 @@ def rollout(
         pieces = [value.reshape(len(value), steps, -1)[:, begin : begin + count] for value in inputs]
         found = march(states[:, begin], *(piece.reshape(len(piece), -1) for piece in pieces))
         states[:, begin + 1 : begin + count + 1] = found
-    return states[:n].T + path.position[0], states[n : 2 * n].T
+    return states[:n].T + path.position[0], states[n:count_of_states].T
 
 
 def _advance(
@@ -190,7 +206,7 @@ def _advance(
     rule, steps, n = scheme(path.order), len(path.mesh) - 1, dynamics.positions
     inputs = _inputs(path, start_time)
     given = [ca.MX.sym("w", value.shape[0], value.shape[1] // steps) for value in inputs]
-    state = ca.MX.sym("state", 2 * n)
+    state = ca.MX.sym("state", n + dynamics.freedom)
     increments = step_map(dynamics, rule, path.hold)(state[:n], state[n:], *given, path.position[0])
     if compensated:
         return _compensated(state, given, ca.vertcat(*increments[:2])), inputs
@@ -225,8 +241,18 @@ def _compensated(state: ca.MX, given: list, increments: ca.MX) -> ca.Function:
     return ca.Function("advance", [ca.vertcat(state, excess), *given], [ca.vertcat(reached, left)])
 
 
-def force_of(dynamics: Dynamics, control: np.ndarray) -> np.ndarray:
-    """Force [N] of controls, one row each."""
-    u = ca.SX.sym("u", dynamics.controls)
-    force = ca.Function("force", [u], [ca.densify(dynamics.actuator.force(u))])
-    return np.array(force(control.T)).T.reshape(len(control), dynamics.positions)
+def force_of(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
+    """What the actuator does at the nodes of a path, or in its steps with hold, one row each.
+
+    A force in space axes [N] and, for a rigid body, a torque in body axes [N m] behind it. A force that is
+    fixed to a turning body and held over a step is that at the begin of the step.
+    """
+    rule = scheme(path.order)
+    at = slice(0, -1, rule.degree) if path.hold else slice(None)
+    return wrench_of(dynamics, path.position[at], path.control)
+
+
+def wrench_of(dynamics: Dynamics, position: np.ndarray, control: np.ndarray) -> np.ndarray:
+    """Force [N] and torque [N m] of controls at positions, one row each."""
+    found = dynamics.wrench(position.T, control.T)
+    return np.array(found).T.reshape(len(control), dynamics.freedom)

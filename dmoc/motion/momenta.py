@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.configuration import speeds_in
+from dmoc.motion.dynamics import Dynamics, actuation
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
@@ -27,12 +28,41 @@ def end_momenta(
     n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     if momenta is None:
         momenta = legendre_momenta(dynamics, path, start_time)
-    p = np.concatenate([-momenta[0], momenta[-1][-1:]])
+    p = along_path(dynamics, path.position[ends], np.concatenate([-momenta[0], momenta[-1][-1:]]))
     if not dynamics.depends_on_velocity:
         return p, p.copy()
     times = start_time + path.duration * path.mesh
     v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
     return p, np.array(v).T.reshape(-1, n)
+
+
+def along_path(dynamics: Dynamics, position: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Z(q)' of columns of the size of q, one row a place: what moves the body and not its constraint."""
+    body = dynamics.configuration
+    if not body.surplus:
+        return columns
+    q, column = ca.SX.sym("q", body.size), ca.SX.sym("column", body.size)
+    function = ca.Function("along", [q, column], [ca.densify(body.along(q, column))])
+    return function(position.T, columns.T).full().T
+
+
+def velocity_along(dynamics: Dynamics, position: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """dq/dt = Z(q) w of places and independent velocities, one row each."""
+    body = dynamics.configuration
+    if not body.surplus:
+        return rates
+    q, w = ca.SX.sym("q", body.size), ca.SX.sym("w", body.freedom)
+    function = ca.Function("velocity", [q, w], [ca.densify(body.velocity(q, w))])
+    return function(position.T, rates.T).full().T
+
+
+def rates_along(dynamics: Dynamics, position: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Independent velocities w of dq/dt = Z(q) w, one row a place."""
+    if not dynamics.configuration.surplus:
+        return slopes
+    # Z' dq/dt is w of a place and w / 4 of a unit quaternion, since Z = L H / 2 there.
+    along = along_path(dynamics, position, slopes)
+    return np.where(speeds_in(dynamics.configuration.blocks), along, 4 * along)
 
 
 def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
@@ -42,7 +72,7 @@ def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) 
 
 
 def node_velocities(path: DiscretePath, ends: np.ndarray) -> np.ndarray:
-    """Velocity at every node [m/s]: that at the step ends, and of a polynomial with those inside the steps."""
+    """dq/dt at every node: that at the step ends, and of a polynomial with those inside the steps."""
     rule, h = scheme(path.order), path.duration * np.diff(path.mesh)[:, None]
     at = step_nodes(len(path.mesh) - 1, rule)
     known = [*path.position[at], ends[:-1] * h, ends[1:] * h]
@@ -53,13 +83,13 @@ def node_velocities(path: DiscretePath, ends: np.ndarray) -> np.ndarray:
 
 
 def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
-    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 axes, 2 axes) [SI].
+    """Derivative of the one-step map in (q, p) along a path, shape (steps, 2 freedom, 2 freedom) [SI].
 
     By the implicit function theorem from the slopes B of the momenta: p_0 = -P_0, P_1 = .. = P_{s-1} = 0
     and p_1 = P_s are linear in the changes of all positions of the step. All are infinite if one step's
     equations have no solution.
     """
-    n, s, steps = dynamics.positions, scheme(path.order).degree, len(path.mesh) - 1
+    n, s, steps = dynamics.freedom, scheme(path.order).degree, len(path.mesh) - 1
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
     function = remembered(make, "legendre slopes", dynamics, path.order, path.hold)
     slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
@@ -92,10 +122,16 @@ def _given(path: DiscretePath, start_time: float) -> tuple:
 
 
 def _legendre_slopes(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
-    """(q, m, u, t, h, origin) -> derivative of P_0 .. P_s in q."""
-    function = legendre_function(dynamics, order, hold)
+    """(q, m, u, t, h, origin) -> derivative of P_0 .. P_s in q, of Z'P in turns for a body that turns."""
+    function, body = legendre_function(dynamics, order, hold), dynamics.configuration
     given = function.sx_in()
-    slopes = ca.jacobian(ca.vertcat(*function.call(given)), given[0])
+    momenta = function.call(given)
+    if body.surplus:
+        nodes = [q + given[-1] for q in ca.vertsplit(given[0], body.size)]
+        along = [body.along(q, momentum) for q, momentum in zip(nodes, momenta, strict=True)]
+        slopes = ca.jacobian(ca.vertcat(*along), given[0]) @ ca.diagcat(*map(body.tangent, nodes))
+    else:
+        slopes = ca.jacobian(ca.vertcat(*momenta), given[0])
     return ca.Function("slopes", given, [ca.densify(slopes)])
 
 
@@ -108,18 +144,20 @@ def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function
 
 
 def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
-    rule, n = scheme(order), dynamics.positions
+    rule, n, body = scheme(order), dynamics.positions, dynamics.configuration
     size = dynamics.controls
     q, m = ca.SX.sym("q", n * (rule.degree + 1)), ca.SX.sym("m", rule.degree + 1)
     u = ca.SX.sym("u", size * (1 if hold else rule.degree + 1))
     t, h, origin = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("origin", n)
+    nodes = ca.vertsplit(q, n)
+    controls = [u[:size] if hold else u[size * j : size * (j + 1)] for j in range(rule.degree + 1)]
     push = [
-        dynamics.actuator.force(u[:size] if hold else u[size * j : size * (j + 1)]) / m[j]
-        for j in range(rule.degree + 1)
+        actuation(body, dynamics.actuator, place + origin, control) / m[j]
+        for j, (place, control) in enumerate(zip(nodes, controls, strict=True))
     ]
 
     def point(t, r, v, m):
         return dynamics.point(t, r + origin, v, m)
 
-    momenta = step_momenta(rule, point, t, h, ca.vertsplit(q, n), ca.vertsplit(m), push)
+    momenta = step_momenta(rule, point, t, h, nodes, ca.vertsplit(m), push, body.blocks)
     return ca.Function("legendre", [q, m, u, t, h, origin], momenta)

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dmoc.basics.numerics import cubic_spline
+from dmoc.basics.quaternions import angle_between, normalised, times
+from dmoc.motion.configuration import QUATERNION, places_in, quaternions_in, speeds_in
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
 
@@ -53,11 +55,16 @@ class DiscretePath:
     mesh : array, shape (steps+1,)
         Step ends as fractions of the duration.
     position, control, mass : arrays, shape (nodes, ...)
-        [m], the actuator's units, [kg]; with hold the controls are one row a step.
+        Coordinates q, places in [m] and attitudes as unit quaternions, the actuator's units, [kg]; with hold
+        the controls are one row a step.
     start_velocity, goal_velocity : arrays
-        [m/s].
+        [m/s], and rates in body axes [rad/s].
     multipliers : dict
         Costates and bound multipliers by group, densities in time; empty for a plain guess.
+    blocks : tuple of int
+        Sizes of the parts of q in turn, 4 for a unit quaternion, as in `Configuration`; one place if empty.
+    reaction : array, shape (nodes, entries), optional
+        Forces of the constraint g(q) = 0 per unit mass; 0 if not given.
     """
 
     mesh: np.ndarray
@@ -70,11 +77,39 @@ class DiscretePath:
     start_velocity: np.ndarray
     goal_velocity: np.ndarray
     multipliers: dict[Key, np.ndarray] = field(default_factory=dict)
+    blocks: tuple[int, ...] = ()
+    reaction: np.ndarray | None = None
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """The sizes of the parts of q in turn."""
+        return self.blocks or self.position.shape[1:]
+
+    @property
+    def place(self) -> np.ndarray:
+        """The coordinates that are places in space [m], shape (nodes, axes)."""
+        return self.position[:, places_in(self.parts)] if self.blocks else self.position
+
+    @property
+    def attitudes(self) -> list[np.ndarray]:
+        """The unit quaternions of each body that turns, shape (nodes, 4) each."""
+        return [self.position[:, at] for at in quaternions_in(self.parts)]
 
     @property
     def diagonal(self) -> float:
         """Diagonal of the box around the path [m]."""
-        return float(np.linalg.norm(np.ptp(self.position, axis=0)))
+        return float(np.linalg.norm(np.ptp(self.place, axis=0)))
+
+    @property
+    def turn(self) -> float:
+        """The largest angle that a body is turned by from the start [rad]."""
+        return max((float(angle_between(q[:1], q).max()) for q in self.attitudes), default=0.0)
+
+    @property
+    def largest_turn(self) -> float:
+        """The largest angle between the attitudes of neighbouring nodes, of one sign of q [rad]."""
+        cosines = [np.sum(q[1:] * q[:-1], axis=1).min() for q in self.attitudes]
+        return 2 * float(np.arccos(np.clip(min(cosines, default=1.0), -1.0, 1.0)))
 
     @property
     def fractions(self) -> np.ndarray:
@@ -89,10 +124,13 @@ class DiscretePath:
         middles, old_middles = 0.5 * (mesh[1:] + mesh[:-1]), 0.5 * (self.mesh[1:] + self.mesh[:-1])
         old_control = old_middles if self.hold else old
         new_control = middles if hold else new
-        ends = (self.start_velocity * self.duration, self.goal_velocity * self.duration)
+        ends = tuple(
+            self._slope(place, velocity) * self.duration
+            for place, velocity in ((0, self.start_velocity), (-1, self.goal_velocity))
+        )
         # The path must stay smooth, since its second differences are the forces: linear pieces would have
         # jumps.
-        position = cubic_spline(old, self.position, ends)(new)
+        position = self._interpolated(old, new, ends)
         # Ends are often fixed numbers of the problem, to the last bit.
         position[0], position[-1] = self.position[0], self.position[-1]
         places = {
@@ -110,7 +148,26 @@ class DiscretePath:
             control=_between(old_control, self.control, new_control),
             mass=np.interp(new, old, self.mass),
             multipliers=self._carried(mesh, order, places),
+            reaction=None if self.reaction is None else _between(old, self.reaction, new),
         )
+
+    def _slope(self, place: int, velocity: np.ndarray) -> np.ndarray:
+        """dq/dt at a node from the independent velocities there."""
+        slopes, taken = [], 0
+        for size, at in zip(self.parts, np.cumsum((0, *self.parts)), strict=False):
+            count = 3 if size == QUATERNION else size
+            here, taken = velocity[taken : taken + count], taken + count
+            if size == QUATERNION:
+                here = 0.5 * times(self.position[place, at : at + size], np.append(0.0, here))
+            slopes.append(here)
+        return np.concatenate(slopes)
+
+    def _interpolated(self, old: np.ndarray, new: np.ndarray, ends: tuple) -> np.ndarray:
+        """Positions at other fractions; attitudes stay unit quaternions."""
+        position = cubic_spline(old, self.position, ends)(new)
+        for at in quaternions_in(self.parts):
+            position[:, at] = normalised(position[:, at])
+        return position
 
     def _carried(self, mesh: np.ndarray, order: int, places: dict) -> dict[Key, np.ndarray]:
         """The multipliers on another mesh and order."""
@@ -161,11 +218,53 @@ def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray
     return np.stack([np.interp(new, old, column) for column in values.T], axis=1) if values.size else values
 
 
-def path_scales(path: DiscretePath) -> tuple[float, float]:
-    """Extent of the path [m] and its mean speed or the speed of its ends if that is more [m/s]."""
+@dataclass(frozen=True)
+class Scales:
+    """The sizes that errors of a path are judged by.
+
+    `extent` [m] and `speed` [m/s] belong to places, `turn` [rad] and `rate` [rad/s] to attitudes.
+    """
+
+    extent: float
+    speed: float
+    turn: float
+    rate: float
+    blocks: tuple[int, ...]
+
+    @property
+    def positions(self) -> np.ndarray:
+        """One for each way the body can move: entries of a place, small turns of an attitude."""
+        return np.where(speeds_in(self.blocks), self.extent, self.turn)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """One for each independent velocity."""
+        return np.where(speeds_in(self.blocks), self.speed, self.rate)
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """One for each coordinate; a small turn moves a quaternion by half of it."""
+        return np.where(places_in(self.blocks), self.extent, 0.5 * self.turn)
+
+    def share(self, moved: np.ndarray, slipped: np.ndarray) -> float:
+        """The largest of errors of position and velocity over their sizes, block by block [-]."""
+        ends = np.cumsum([3 if size == QUATERNION else size for size in self.blocks])[:-1]
+        parts = [*np.split(moved / self.positions, ends), *np.split(slipped / self.velocities, ends)]
+        return float(max(np.linalg.norm(part) for part in parts))
+
+
+def path_scales(path: DiscretePath) -> Scales:
+    """Extent of the path and its mean speed or that of its ends if that is more; the same for its turn."""
     extent = path.diagonal
-    ends = max(float(np.linalg.norm(v)) for v in (path.start_velocity, path.goal_velocity))
+    speeds = speeds_in(path.parts)
+    both = np.array([path.start_velocity, path.goal_velocity])
+    ends = float(np.linalg.norm(both[:, speeds], axis=1).max())
     # A body that ends where it began along a line of no extent is measured by what its speed would cover.
     extent = extent or ends * path.duration or 1.0
-    length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
-    return extent, max(length / path.duration, ends) or extent / path.duration
+    length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
+    speed = max(length / path.duration, ends) or extent / path.duration
+    spins = float(np.linalg.norm(both[:, ~speeds], axis=1).max())
+    turn = path.turn or min(spins * path.duration, np.pi) or 1.0
+    turned = sum(float(angle_between(q[1:], q[:-1]).sum()) for q in path.attitudes)
+    rate = max(turned / path.duration, spins) or turn / path.duration
+    return Scales(extent, speed, turn, rate, tuple(path.parts))

@@ -10,10 +10,13 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.quaternions import conjugate, rotation_vectors
+from dmoc.basics.quaternions import times as multiplied
+from dmoc.motion.configuration import QUATERNION, places_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.motion.step import weighted
 
 # The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
@@ -24,12 +27,28 @@ MOST_PARTS = 1_000_000
 MISSED = 1e-2
 
 
-def goal_miss(dynamics: Dynamics, path: DiscretePath, start_time: float) -> tuple[float, float]:
-    """By how much `reference` misses the goal of a path [m] and its velocity there [m/s]."""
+def goal_miss(dynamics: Dynamics, path: DiscretePath, start_time: float) -> tuple[np.ndarray, np.ndarray]:
+    """By how much `reference` misses the goal of a path and its velocity there, one entry a freedom.
+
+    Places in [m], attitudes as small turns about the body axes [rad]; speeds [m/s] and rates [rad/s].
+    """
     # A motion that cannot be integrated gives NaN, which no limit lets pass.
     with np.errstate(invalid="ignore"):
         q, v = reference(dynamics, path, start_time, path.start_velocity)
-    return float(np.linalg.norm(q - path.position[-1])), float(np.linalg.norm(v - path.goal_velocity))
+        return apart(path.parts, q, path.position[-1]), v - path.goal_velocity
+
+
+def apart(blocks: tuple[int, ...], one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The differences of coordinates, of attitudes as rotation vectors [rad]; of shape (..., freedom)."""
+    ends = np.cumsum(blocks)[:-1]
+    pairs = zip(np.split(one, ends, axis=-1), np.split(other, ends, axis=-1), strict=True)
+    return np.concatenate(
+        [
+            rotation_vectors(multiplied(conjugate(b), a)) if a.shape[-1] == QUATERNION else a - b
+            for a, b in pairs
+        ],
+        axis=-1,
+    )
 
 
 def reference(
@@ -40,7 +59,8 @@ def reference(
     Dormand and Prince's Runge-Kutta method of order 8 with the coefficients and the error estimate of
     SciPy, on the equations of motion: it knows nothing of the scheme. The control is the one that is flown
     (`dmoc.motion.flown`), with hold the held value; the integrator restarts wherever its derivatives jump,
-    and cuts pieces in parts until its error is below 1e-11.
+    and cuts pieces in parts until its error is below 1e-11. A body turns by Euler's equations and
+    dq/dt = q o (0, w) / 2, whose quaternion may leave the unit sphere by the integrator's error.
 
     Returns
     -------
@@ -70,11 +90,11 @@ def reference(
             break
         if worst.max() <= 1:
             end = states.full()[:, -1]
-            return path.position[0] + end[:n], end[n : 2 * n]
+            return path.position[0] + end[:n], end[n:-1]
         # The error of order 8 falls with the 8th power of the number of parts, hence the root; a tenth for
         # safety.
         parts = parts * np.where(worst > 1, np.ceil(np.clip(1.1 * worst**0.125, 2, 64)), 1).astype(int)
-    return np.full(n, np.nan), np.full(n, np.nan)
+    return np.full(n, np.nan), np.full(dynamics.freedom, np.nan)
 
 
 def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
@@ -90,6 +110,10 @@ def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray,
 def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
     """Absolute errors [m], [m/s], [kg] that the integrator may make: 1e-12 of extent, speed and mass."""
     n, duration = path.position.shape[1], path.duration
+    if path.attitudes:
+        scales = path_scales(path)
+        units = np.where(places_in(path.parts), scales.extent, 1.0)
+        return 1e-12 * np.concatenate([units, scales.velocities, path.mass[:1]])
     thrust = np.abs(control).max(initial=0.0) / path.mass.min()
     # A body held in place has no extent: a thousandth of where the thrust alone would take it stands in.
     extent = max(np.ptp(path.position, axis=0).max(), 1e-3 * thrust * duration**2) or 1.0
@@ -106,16 +130,16 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     """
     places, rows, *weights = coefficients()
     n, count = dynamics.positions, dynamics.controls
-    state, powers = ca.SX.sym("state", 2 * n + 1), ca.SX.sym("control", size)
+    states = n + dynamics.freedom + 1
+    state, powers = ca.SX.sym("state", states), ca.SX.sym("control", size)
     t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
-    origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", 2 * n + 1)
+    origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", states)
 
     def rate(fraction, y):
         u = sum(powers[count * p : count * (p + 1)] * fraction**p for p in range(size // count))
-        force, flow = dynamics.actuator.force(u), dynamics.actuator.flow(u)
-        v = y[n : 2 * n]
-        push = dynamics.acceleration(t + fraction * h, y[:n] + origin, v, y[-1], force)
-        return ca.vertcat(v, push, 0 if flow is None else -flow)
+        q, v, flow = y[:n] + origin, y[n:-1], dynamics.actuator.flow(u)
+        push = dynamics.acceleration(t + fraction * h, q, v, y[-1], dynamics.wrench(q, u))
+        return ca.vertcat(dynamics.configuration.velocity(q, v), push, 0 if flow is None else -flow)
 
     length = share * h
     slopes: list[ca.SX] = []

@@ -65,16 +65,20 @@ def growth_along(
 
 
 def _rate_bound(flow: np.ndarray) -> np.ndarray:
-    """A bound of the rates [1/s]: no eigenvalue of [[0, 1], [K, G]] exceeds the root of x^2 = |G| x + |K|."""
+    """A bound of the rates [1/s].
+
+    No eigenvalue of [[A, 1], [K, G]] exceeds the larger root of (x - |A|) (x - |G|) = |K|.
+    """
     n = flow.shape[1] // 2
-    stiffness, damping = (np.linalg.norm(part, axis=(1, 2)) for part in (flow[:, n:, :n], flow[:, n:, n:]))
-    return 0.5 * (damping + np.sqrt(damping**2 + 4 * stiffness))
+    blocks = flow[:, :n, :n], flow[:, n:, :n], flow[:, n:, n:]
+    turning, stiffness, damping = (np.linalg.norm(part, axis=(1, 2)) for part in blocks)
+    return 0.5 * (turning + damping + np.sqrt((turning - damping) ** 2 + 4 * stiffness))
 
 
 def flow_matrices(
     dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
 ) -> tuple[np.ndarray, bool]:
-    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 axes, 2 axes), and whether it is constant."""
+    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 freedom, 2 freedom), and whether it is constant."""
     n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh

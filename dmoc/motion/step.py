@@ -31,7 +31,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.configuration import places_in, quaternions_in
+from dmoc.motion.dynamics import Dynamics, actuation
 from dmoc.motion.lobatto import Scheme
 
 
@@ -41,7 +42,9 @@ def step_velocities(scheme: Scheme, h, q: Sequence) -> list:
     return [weighted(row[1:], moves) / h for row in scheme.derivative]
 
 
-def step_momenta(scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequence, push: Sequence) -> list:
+def step_momenta(
+    scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequence, push: Sequence, blocks: tuple = ()
+) -> list:
     """P_0 .. P_s of one step [m/s].
 
     Parameters
@@ -56,14 +59,19 @@ def step_momenta(scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequenc
         Masses there [kg].
     push : list of columns
         Actuator force per mass there [m/s^2].
+    blocks : tuple of int
+        As in `Configuration`, where there are attitudes among the coordinates.
     """
     v = step_velocities(scheme, h, q)
     at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
-    # dl/dv is v plus the momentum that effects add. The sum over v is one constant matrix times the
+    # dl/dv of a place is v plus the momentum that effects add. The sum over v is one constant matrix times the
     # displacements; the second part is zero for most effects.
-    added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
     inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
     moves = [position - q[0] for position in q[1:]]
+    if quaternions_in(blocks):
+        places = ca.DM(places_in(blocks).astype(float))
+        v, moves = [velocity * places for velocity in v], [move * places for move in moves]
+    added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
     return [
         weighted(inertia[j, 1:], moves) / h
         + weighted(scheme.weights * scheme.derivative[:, j], added)
@@ -84,41 +92,79 @@ def step_map(dynamics: Dynamics, scheme: Scheme, hold: bool = False) -> ca.Funct
 
 
 def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
-    n, s = dynamics.positions, scheme.degree
-    q, p, origin = (ca.SX.sym(name, n) for name in ("q", "p", "origin"))
+    n, s, body = dynamics.positions, scheme.degree, dynamics.configuration
+    q, origin = (ca.SX.sym(name, n) for name in ("q", "origin"))
+    p = ca.SX.sym("p", dynamics.freedom)
     t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)
     u = ca.SX.sym("u", dynamics.controls, 1 if hold else s + 1)
     given = [q, p, masses, u, t, h, origin]
     names = ["q", "p", "m", "u", "t", "h", "origin"]
     m = ca.vertsplit(masses)
-    push = [dynamics.actuator.force(u[:, 0 if hold else j]) / m[j] for j in range(s + 1)]
 
     def point(t, r, v, m):
         return dynamics.point(t, r + origin, v, m)
 
-    velocity = dynamics.velocity(t, q + origin, p, m[0])
+    def push(positions: Sequence) -> list:
+        at = [(positions[j] + origin, u[:, 0 if hold else j], m[j]) for j in range(s + 1)]
+        return [actuation(body, dynamics.actuator, place, control) / mass for place, control, mass in at]
+
+    rate = dynamics.velocity(t, q + origin, p, m[0])
+    velocity = body.velocity(q + origin, rate)
     dldq, _, force = point(t, q, velocity, m[0])
-    kick = dldq + force + push[0]
+    kick = dldq + force + push([q] * (s + 1))[0]
     if s == 1 and not dynamics.depends_on_velocity:
-        increments = _increments(scheme, point, t, h, q, [h * (p + 0.5 * h * kick)], m, push)
+        moved = [h * (p + 0.5 * h * kick)]
+        increments = _increments(scheme, point, t, h, q, moved, m, push([q, *[q + move for move in moved]]))
         return ca.Function("step", given, increments, names, ["dq", "dp", "v"])
-    # The unknowns are displacements over h times a typical speed, which makes them of order 1 in every scene;
-    # 1e-300 keeps that speed above zero for a body at rest that nothing pushes.
-    speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
+    first, speed = _first_guess(dynamics, scheme, h, (p, velocity, kick))
     y = ca.SX.sym("y", n * s)
     moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
-    momenta = step_momenta(scheme, point, t, h, [q, *[q + move for move in moves]], m, push)
-    rows = ca.Function("rows", [y, *given], [ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed])
+    nodes = [q, *[q + move for move in moves]]
+    momenta = step_momenta(scheme, point, t, h, nodes, m, push(nodes), body.blocks)
+    rows = ca.Function("rows", [y, *given], [_rows(dynamics, h, p, speed, [r + origin for r in nodes], momenta)])
     # Convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off. The size of
     # the rows decides nothing.
     settings = {"abstol": 1e-300, "abstolStep": 1e-11, "max_iter": 30, "error_on_fail": False}
     newton = ca.rootfinder("newton", "fast_newton", rows, settings)
-    first = [c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]
-    start = ca.Function("start", given, [ca.vertcat(*first)])
-    finish = ca.Function("finish", [y, *given], _increments(scheme, point, t, h, q, moves, m, push))
+    start = ca.Function("start", given, [first])
+    if body.surplus:
+        last = [moves[-1], body.along(nodes[-1] + origin, momenta[-1]) - p]
+        increments = [*last, ca.horzcat(*step_velocities(scheme, h, nodes))]
+    else:
+        increments = _increments(scheme, point, t, h, q, moves, m, push(nodes))
+    finish = ca.Function("finish", [y, *given], increments)
     arguments = [ca.MX.sym(name, *a.shape) for name, a in zip(names, given, strict=True)]
     root = newton(start(*arguments), *arguments)
     return ca.Function("step", arguments, finish(root, *arguments), names, ["dq", "dp", "v"])
+
+
+def _first_guess(dynamics: Dynamics, scheme: Scheme, h: Any, state: tuple) -> tuple[Any, Any]:
+    """The unknowns of one step for Newton's method to start from, and the speeds that they are divided by.
+
+    The unknowns are displacements over h times a typical speed, which makes them of order 1 in every scene;
+    1e-300 keeps that speed above zero for a body at rest that nothing pushes.
+    """
+    p, velocity, kick = state
+    if not dynamics.configuration.surplus:
+        speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
+        return ca.vertcat(*[c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]), speed
+    places = places_in(dynamics.configuration.blocks)
+    along = velocity * ca.DM(places.astype(float))
+    linear = ca.sqrt(ca.dot(along, along) + 1e-300)
+    # A body that turns by more than a radian a step leaves the scheme, so a quaternion changes by less than 1.
+    speed = ca.vertcat(*[linear + ca.norm_2(h * kick * ca.DM(places.astype(float))) if place else 1 / h for place in places])
+    return ca.vertcat(*[c * velocity / speed for c in scheme.points[1:]]), speed
+
+
+def _rows(dynamics: Dynamics, h: Any, p: Any, speed: Any, nodes: Sequence, momenta: Sequence) -> Any:
+    """The equations of one step: Z' P_0 + p = 0 and, at the later nodes but the last, Z' P_j = 0; and g = 0."""
+    body = dynamics.configuration
+    if not body.surplus:
+        return ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed
+    # Momenta of places are divided by their speed; those of attitudes have no scale that would change Newton's way.
+    first = body.along(nodes[0], momenta[0]) + p
+    inner = [body.along(q, momentum) for q, momentum in zip(nodes[1:-1], momenta[1:-1], strict=True)]
+    return ca.vertcat(first, *inner, *[body.g(q) for q in nodes[1:]])
 
 
 def _increments(scheme: Scheme, point, t, h, q, moves: Sequence, m: Sequence, push: Sequence) -> list:

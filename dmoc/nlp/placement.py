@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
@@ -38,8 +39,11 @@ class Placement:
         self.rows = Layout()
         self._lower: list[np.ndarray] = []
         self._upper: list[np.ndarray] = []
-        # A row of motion is a momentum per unit mass [m/s]; as an impulse over force times time it is near 1.
-        impulse = problem.mass / (units.force * units.time)
+        # A row of motion is a momentum per unit mass [m/s], of an attitude [m^2/s]; as an impulse over force or
+        # torque times time it is near 1.
+        body = self.dynamics.configuration
+        unit = np.where(places_in(body.blocks), units.force, units.torque)
+        impulse = (problem.mass / (unit * units.time))[None]
         axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
         numbers = {
@@ -57,14 +61,21 @@ class Placement:
 
     def _columns(self) -> Layout:
         problem, units, nodes = self.problem, self.units, self.counts["node"]
-        axes, speed = self.dynamics.configuration.names, units.length / units.time
-        columns = Layout().add("position", "node", axes, nodes, units.length)
-        labels = problem.actuator.labels(problem.dimension)
-        columns = columns.add("force", "control", labels, self.steps if self.hold else nodes, units.force)
+        body, actuator, n = self.dynamics.configuration, problem.actuator, problem.dimension
+        lengths = np.where(places_in(body.blocks), units.length, 1.0)[None]
+        speeds = np.where(speeds_in(body.blocks), units.length / units.time, 1 / units.time)[None]
+        columns = Layout().add("position", "node", body.names, nodes, lengths)
+        sizes = np.array([[units.torque if unit == "N m" else units.force for unit in actuator.units(n)]])
+        controls = self.steps if self.hold else nodes
+        columns = columns.add("force", "control", actuator.labels(n), controls, sizes)
+        if body.surplus:
+            # The force of the constraint on a quaternion is a torque per unit mass.
+            reactions = units.torque / problem.mass
+            columns = columns.add("reaction", "node", [str(i) for i in range(body.surplus)], nodes, reactions)
         if problem.actuator.burns:
             columns = columns.add("mass", "node", ("",), nodes, units.mass)
-        columns = columns.add("start.velocity", "end", axes, 1, speed)
-        columns = columns.add("goal.velocity", "end", axes, 1, speed)
+        columns = columns.add("start.velocity", "end", body.velocity_names, 1, speeds)
+        columns = columns.add("goal.velocity", "end", body.velocity_names, 1, speeds)
         return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
 
     def _add_rows(self, limit: Limit, count: int, scale: Any) -> None:
@@ -77,9 +88,8 @@ class Placement:
     def _block(self, stencil: Stencil, numbers: dict[str, np.ndarray]) -> Block:
         """A stencil with its places on the mesh, after its own rows have been added to the layout."""
         units, count = self.units, self.counts[stencil.every]
-        sizes = {"": 1.0, "m": units.length, "m/s": units.length / units.time, "kg": units.mass}
         for limit in stencil.limits:
-            self._add_rows(limit, count, np.array([[1 / sizes[row.unit] for row in limit.rows]]))
+            self._add_rows(limit, count, np.array([[1 / units.of(row.unit) for row in limit.rows]]))
 
         def stacked(layout: Layout, places: Sequence[tuple[str, slice]]) -> np.ndarray:
             found = [layout[group].indices[:, at] for group, at in places]

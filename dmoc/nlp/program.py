@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.motion.configuration import configuration_of, places_in, quaternions_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
@@ -15,6 +16,7 @@ from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.layout import Group, Layout
+from dmoc.nlp.stencils import CONSTRAINT
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
 from dmoc.scene.problem import TransferProblem
@@ -48,6 +50,7 @@ class Program:
 
         same = {
             "dimension": problem.dimension == old.dimension,
+            "inertia": configuration_of(problem) == self.dynamics.configuration,
             "effects": each(_equal, problem.effects, old.effects),
             "actuator": _built_alike(problem.actuator, old.actuator),
             "objective": _equal(problem.objective, old.objective),
@@ -74,9 +77,12 @@ class Program:
             lower[group.start : group.stop] = np.broadcast_to(low, (group.count, len(group.labels))).ravel()
             upper[group.start : group.stop] = np.broadcast_to(high, (group.count, len(group.labels))).ravel()
 
-        n, origin = problem.dimension, self.units.origin
+        n, origin, places = problem.dimension, self.units.origin, places_in(self.dynamics.configuration.blocks)
         boxes = [constraint.bounds(n) for constraint in problem.constraints]
-        put("position", *(np.array(side) - origin for side in _intersection(boxes, n)))
+        sides = [np.full(len(places), side) for side in (-np.inf, np.inf)]
+        for side, found in zip(sides, _intersection(boxes, n), strict=True):
+            side[places] = found[: places.sum()]
+        put("position", *(side - origin for side in sides))
         put("force", *problem.actuator.bounds(n))
         if problem.free_duration:
             put("duration", *problem.duration_bounds)
@@ -98,10 +104,14 @@ class Program:
 
         Whether such a state keeps the limits is checked when the problem is made.
         """
+        places = places_in(self.dynamics.configuration.blocks)
         for end, place in (("start", 0), ("goal", -1)):
             position, velocity = getattr(problem, end).fixed()
             for group in self.rows.groups:
-                if group.kind == "node" and not np.isnan(position).any():
+                if group.name == CONSTRAINT:
+                    low[group.indices[~_open(self.dynamics, position), place]] = -np.inf
+                    high[group.indices[~_open(self.dynamics, position), place]] = np.inf
+                elif group.kind == "node" and not np.isnan(position).any():
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 if group.owner and group.owner.end == end and not np.isnan(velocity).any():
                     low[group.indices], high[group.indices] = -np.inf, np.inf
@@ -127,6 +137,7 @@ class Program:
             "start.velocity": path.start_velocity,
             "goal.velocity": path.goal_velocity,
             "duration": path.duration,
+            "reaction": np.zeros(len(path.position)) if path.reaction is None else path.reaction,
         }
         return self.scaled(values, np.ravel, np.concatenate)
 
@@ -145,7 +156,15 @@ class Program:
             get["mass"][:, 0] if "mass" in get else np.full(nodes, problem.mass),
             get["start.velocity"][0],
             get["goal.velocity"][0],
+            blocks=self.blocks,
+            reaction=get.get("reaction"),
         )
+
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Sizes of the parts of q, where there is more than one place."""
+        body = self.dynamics.configuration
+        return body.blocks if body.surplus else ()
 
     def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
@@ -211,6 +230,11 @@ def _built_in(part: Any) -> dict[str, Any]:
 def _equal(new: Any, old: Any) -> bool:
     """Whether two parts have equal attributes, those included that are no fields of a dataclass."""
     return type(new) is type(old) and vars(new) == vars(old)
+
+
+def _open(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
+    """Which entries of the constraint g look at an entry of a boundary position that is free (NaN)."""
+    return np.array([np.isnan(position[at]).any() for at in quaternions_in(dynamics.configuration.blocks)])
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:

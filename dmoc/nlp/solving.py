@@ -19,7 +19,7 @@ from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
 from dmoc.nlp.ipopt_options import settings_for
 from dmoc.nlp.program import Program
 from dmoc.results.facts import Level, Provenance
-from dmoc.results.solution import Solution
+from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
 # A user's function that follows a solve takes (order, steps, iteration, objective, name of the worst row, its
@@ -103,9 +103,7 @@ class NLP(Program):
         return Solution(
             problem=problem,
             path=path,
-            velocity=velocity,
-            momentum=momentum,
-            force=force_of(self.dynamics, path.control),
+            **reported(path, velocity, momentum, force_of(self.dynamics, path)),
             objective=self.objective(answer.objective),
             success=answer.status == "solved",
             status=answer.status,

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.dynamics import Dynamics, point_function, split_effects
+from dmoc.motion.configuration import configuration_of
+from dmoc.motion.dynamics import Dynamics, actuation, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
@@ -26,6 +27,8 @@ from dmoc.nlp.layout import Owner
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
+# The group of rows g(q) = 0 has this name.
+CONSTRAINT = "constraint"
 # A stencil takes all entries of a group, one for each evaluation.
 ALL = slice(None)
 # A stencil takes the first entry of a group: that of the start.
@@ -65,7 +68,7 @@ def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [type(constraint) for constraint in problem.constraints]
-    shape = problem.dimension, problem.free_duration, order, hold
+    shape = configuration_of(problem), problem.free_duration, order, hold
     make = partial(_written, problem, scheme(order), hold)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
@@ -101,21 +104,25 @@ class _Writer:
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
-        draft, n = _Draft(self), self.dynamics.positions
+        draft, n, body = _Draft(self), self.dynamics.positions, self.dynamics.configuration
         r = draft.take("position", n)
         u = None if self.hold else draft.take("force", self.dynamics.controls)
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = self.start_time + fraction * duration, r + self.origin
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
-        resting, _ = split_effects(self.problem.effects, n)
-        dldq, _, push = point_function(resting, self.dynamics.configuration, kinetic=False)(
-            t, q, ca.DM.zeros(n), m
-        )
-        push = push if u is None else push + self.actuator.force(u) / m
+        resting, _ = split_effects(self.problem.effects, body)
+        dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
+        push = push if u is None else push + actuation(body, self.actuator, q, u) / m
+        if body.surplus:
+            push = push - body.pull(q, draft.take("reaction", body.surplus))
         draft.add("dynamics", duration * weight * (dldq + push))
+        if body.surplus:
+            rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q)))]
+            draft.limit(CONSTRAINT, "node", rows)
         for i, constraint in enumerate(self.constraints):
-            draft.limit(title(constraint, i), "node", constraint.rows(t, q, u, m), Owner("constraints", i))
+            rows = constraint.rows_of(t, body.body(q, ca.DM.zeros(n)), u, m)
+            draft.limit(title(constraint, i), "node", rows, Owner("constraints", i))
         if u is not None:
             draft.limit("actuator", "control", self.actuator.rows(u), Owner("actuator"))
         if not self._cost_in_steps():
@@ -137,20 +144,28 @@ class _Writer:
             u = [draft.take("force", size)] * (rule.degree + 1)
         elif costly:
             u = [draft.take("force", size, at) for at in nodes]
-        push = [self.actuator.force(u[0]) / mass if self.hold else 0 for mass in m]
-        moving = point_function(split_effects(problem.effects, n)[1], self.dynamics.configuration)
+        body = self.dynamics.configuration
+        push = [
+            actuation(body, self.actuator, place + self.origin, u[0]) / mass if self.hold else 0
+            for place, mass in zip(r, m, strict=True)
+        ]
+        moving = point_function(split_effects(problem.effects, body)[1], body)
         t0 = self.start_time + begin * duration
 
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
 
-        for momentum, at in zip(step_momenta(rule, point, t0, h, r, m, push), nodes, strict=True):
+        for momentum, at in zip(step_momenta(rule, point, t0, h, r, m, push, body.blocks), nodes, strict=True):
             draft.add("dynamics", momentum, at)
         moves = [position - r[0] for position in r[1:]]
         for i, constraint in enumerate(self.constraints):
             at_gauss = [weighted(row[1:], moves) / h for row in rule.slopes_at(rule.gauss_points())]
+            states = zip(rule.values_at(rule.gauss_points()), at_gauss, strict=True)
+            bodies = [body.body(self.origin + weighted(row, r), v) for row, v in states]
             rows = [
-                row._replace(name=str(g)) for g, v in enumerate(at_gauss) for row in constraint.speed_rows(v)
+                row._replace(name=str(g))
+                for g, one in enumerate(bodies)
+                for row in constraint.speed_rows_of(one)
             ]
             draft.limit(title(constraint, i), "step", rows, Owner("constraints", i))
         if self.hold:
@@ -177,10 +192,15 @@ class _Writer:
         def point(t, r, v, m):
             return self.dynamics.point(t, r + self.origin, v, m)
 
-        momenta = step_momenta(self.rule, point, t0, h, r, m, push)
+        body = self.dynamics.configuration
+        momenta = step_momenta(self.rule, point, t0, h, r, m, push, body.blocks)
+        momenta = [body.along(q + self.origin, p) for q, p in zip(r, momenta, strict=True)]
         ends = ((t0, r[0], -momenta[0], m[0]), (t0 + h, r[-1], momenta[-1], m[-1]))
-        first, last = (self.dynamics.velocity(t, q + self.origin, p, m) for t, q, p, m in ends)
-        return first, last
+        found = []
+        for t, q, p, m in ends:
+            at = q + self.origin
+            found.append(body.velocity(at, self.dynamics.velocity(t, at, p, m)))
+        return tuple(found)
 
     def _burn(self, draft: _Draft, h: Any, m: list, flow: list) -> None:
         """Node masses by the Lobatto IIIA matrix A: m_i = m_0 - h sum_j A_ij flow_j, s rows a step.
@@ -197,7 +217,7 @@ class _Writer:
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
-        draft, n = _Draft(self), self.dynamics.positions
+        draft, n, body = _Draft(self), self.dynamics.positions, self.dynamics.configuration
         first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
         v = {end: draft.take(f"{end}.velocity", self.dynamics.freedom) for end in ("start", "goal")}
         start_time, goal_time = self.start_time, self.start_time + draft.duration()
@@ -205,19 +225,30 @@ class _Writer:
             "start": (start_time, first, v["start"], draft.mass(FIRST)),
             "goal": (goal_time, last, v["goal"], draft.mass(LAST)),
         }
-        draft.add("dynamics", self.dynamics.point(*states["start"])[1], FIRST)
-        draft.add("dynamics", -self.dynamics.point(*states["goal"])[1], LAST)
+        for (t, q, w, m), sign, at in ((states["start"], 1, FIRST), (states["goal"], -1, LAST)):
+            draft.add("dynamics", sign * self.dynamics.point(t, q, body.velocity(q, w), m)[1], at)
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
-            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows(v[end]))]
+            _, q, w, _ = states[end]
+            here = body.body(q, body.velocity(q, w))
+            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows_of(here))]
             for count, (i, rows) in enumerate(speed):
                 name = f"{end}.speed" + (f"_{count + 1}" if count else "")
                 draft.limit(name, "end", rows, Owner("constraints", i, end))
-        draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*states["goal"]))
+        t, q, w, m = states["goal"]
+        seen = self._seen((t, q, body.velocity(q, w), m))
+        draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*seen))
         return draft.stencil("ends")
 
-    def _rate(self, *state) -> Any:
-        return self.objective.sense * self.objective.rate(self.actuator, *state)
+    def _rate(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        t, q, v, m = self._seen((t, q, v, m))
+        return self.objective.sense * self.objective.rate(self.actuator, t, q, v, u, m)
+
+    def _seen(self, state: tuple) -> tuple:
+        """A state as an objective sees it: position and velocity of a body in space."""
+        t, q, v, m = state
+        body = self.dynamics.configuration.body(q, v)
+        return t, body.position, body.velocity, m
 
     def _cost_in_steps(self) -> bool:
         """Whether the running cost looks at the velocity or at a held control."""

@@ -9,8 +9,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.motion.configuration import configuration_of, places_in, speeds_in
 from dmoc.motion.dynamics import state_symbols
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.scene.problem import TransferProblem
 
 # The size of the objective is estimated from this many nodes: more do not change its first digit.
@@ -21,14 +22,26 @@ LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class Units:
-    """Canonical units [m, s, N, kg, unit of the objective] and the origin [m]; Ipopt sees numbers near 1."""
+    """Canonical units [m, s, N, kg, unit of the objective, N m] and the origin [m]; Ipopt sees numbers near 1."""
 
     length: float
     time: float
     force: float
     mass: float
     cost: float
+    torque: float
     origin: np.ndarray
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The size of a number near 1, by its unit."""
+        speed, rate = self.length / self.time, 1 / self.time
+        known = {"m": self.length, "m/s": speed, "rad": 1.0, "rad/s": rate, "kg": self.mass}
+        return known | {"N": self.force, "N m": self.torque, "N m s": self.torque * self.time}
+
+    def of(self, unit: str) -> float:
+        """The size of a number near 1 in this unit; 1 for what has none."""
+        return self.sizes.get(unit, 1.0)
 
 
 def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
@@ -40,50 +53,74 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     or with the unit of force all the way if that is more.
     """
     low, high = guess.position.min(axis=0), guess.position.max(axis=0)
+    places, speeds = places_in(guess.parts), speeds_in(guess.parts)
+    # Attitudes count from zero: their quaternions are of size 1 anyway.
+    origin = np.where(places, 0.5 * (low + high), 0.0)
     time = guess.duration
-    speed = max(np.abs(guess.start_velocity).max(), np.abs(guess.goal_velocity).max())
-    length = guess.diagonal or float(speed * time) or 1.0
+    both = np.array([guess.start_velocity, guess.goal_velocity])[:, speeds]
+    length = guess.diagonal or float(np.abs(both).max(initial=0.0) * time) or 1.0
     change = length / time
     if not problem.effects:
         # Without effects the actuator alone must change the velocities of both ends into the mean one.
-        mean = (guess.position[-1] - guess.position[0]) / time
-        turns = np.array([guess.start_velocity, guess.goal_velocity]) - mean
+        mean = (guess.place[-1] - guess.place[0]) / time
+        turns = both - mean
         change = max(change, float(np.linalg.norm(turns, axis=1).max()))
     typical = problem.mass * change / time
     limit = problem.actuator.force_limit()
-    force = float(np.abs(guess.control).max(initial=0.0)) if guess.multipliers else 0.0
+    forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)])
+    force = float(np.abs(guess.control[:, forces]).max(initial=0.0)) if guess.multipliers else 0.0
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
     force = max(force, LEAST_SHARE * typical) if force else typical
-    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, force))) or 1.0
-    return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
+    torque = _torque(problem, guess, force * length)
+    sizes = np.where(forces, force, torque)
+    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, sizes))) or 1.0
+    return Units(length, time, force, problem.mass, cost, torque, origin)
 
 
-def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0) -> float:
-    """About the objective along a guess, with `force` [N] in place of its controls if that is not zero.
+def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> float:
+    """The unit of torque: the largest used where a solution is known, else the limit, else what turns the body.
+
+    It is `without` [N m] where nothing turns.
+    """
+    if problem.inertia is None:
+        return without
+    turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)])
+    used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
+    scales = path_scales(guess)
+    typical = float(np.trace(problem.inertia)) / 3 * max(scales.turn / guess.duration, scales.rate) / guess.duration
+    limit = problem.actuator.torque_limit()
+    if limit is not None:
+        used = min(max(used, LEAST_SHARE * limit), limit) if used else limit
+    return max(used, LEAST_SHARE * typical) if used else typical
+
+
+def cost_along(problem: TransferProblem, guess: DiscretePath, instead: np.ndarray | None = None) -> float:
+    """About the objective along a guess, with the controls `instead` all the way if they are given.
 
     A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
     node it grows with the number of steps, so at the ends no more counts than the largest force in between.
     """
-    parts = problem.dimension, problem.objective, problem.actuator
+    parts = configuration_of(problem), problem.objective, problem.actuator
     rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]
-    velocity = np.gradient(guess.position[some], times, axis=0)
+    velocity = np.gradient(guess.place[some], times, axis=0)
     nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
     sizes = np.linalg.norm(guess.control, axis=1)
     most = sizes[1:-1].max(initial=0.0) or sizes.max()
     control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
     control = control[np.minimum(nodes, len(guess.mesh) - 2) if guess.hold else some]
-    control = np.full_like(control, force) if force else control
-    rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
-    end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
+    control = control if instead is None else np.broadcast_to(instead, control.shape)
+    rates = rate(times[None], guess.place[some].T, velocity.T, control.T, guess.mass[some][None])
+    last = guess.goal_velocity[speeds_in(guess.parts)]
+    end = terminal(times[-1], guess.place[-1], last, guess.mass[-1])
     return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
 
 
 def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
     """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
-    t, q, v, m = state_symbols(problem.dimension)
+    t, q, v, m = state_symbols(places_in(configuration_of(problem).blocks).sum())
     u = ca.SX.sym("u", problem.controls)
     rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
     terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC
 from typing import Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import up
@@ -54,6 +55,8 @@ class Actuator(ABC):
     smoothing: float | None = None
     # Whether it is off for parts of a usual transfer: pictures then shade the times when it is on.
     coasts: ClassVar[bool] = False
+    # The unit of what `Effort` gives with it.
+    effort_unit: ClassVar[str] = "N^2 s"
     # Pictures label the line at the force limit with this.
     limit_label: ClassVar[str] = "limit"
 
@@ -86,6 +89,32 @@ class Actuator(ABC):
         """Force on the body [N] made by the controls."""
         return u
 
+    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
+        """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0.
+
+        `rotation` is R(q), which turns body axes into space axes; None for a point mass.
+        """
+        return self.force(u), None
+
+    def effort(self, u: Any) -> Any:
+        """The square of the controls that `Effort` integrates: of the force or, where it turns the body, of all."""
+        force = self.force(u)
+        return ca.dot(force, force)
+
+    @property
+    def turns_body(self) -> bool:
+        """Whether it acts on rigid bodies alone."""
+        return False
+
+    @property
+    def moves_body(self) -> bool:
+        """Whether it needs a body with a position."""
+        return True
+
+    def torque_limit(self) -> float | None:
+        """The largest torque [N m] about one axis, or None if there is no limit or no torque."""
+        return None
+
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper limits of the controls."""
         limit = np.full(self.size(dimension), np.inf)
@@ -114,8 +143,26 @@ class Actuator(ABC):
         """The largest force [N] along one axis, or None if there is no limit."""
         return None
 
+    @property
+    def limited(self) -> bool:
+        """Whether its force or torque has a limit."""
+        return self.force_limit() is not None or self.torque_limit() is not None
+
+    def turning_limit(self) -> float | None:
+        """About the torque by which it turns a body when it does its best [N m]; None if there is no limit."""
+        return self.torque_limit()
+
+    def main_limit(self) -> float | None:
+        """Its force limit [N] or, where it makes no force or a free one, its torque limit [N m]."""
+        return self.torque_limit() if self.force_limit() is None else self.force_limit()
+
+    @property
+    def limit_unit(self) -> str:
+        """The unit of `main_limit` and of what `excess` gives."""
+        return "N" if self.torque_limit() is None or self.force_limit() is not None else "N m"
+
     def excess(self, u: np.ndarray) -> np.ndarray:
-        """By how much the controls, shape (count, size), break the limits [N]; 0 where they hold."""
+        """By how much the controls, shape (count, size), break the limits [`limit_unit`]; 0 where they hold."""
         lower, upper = self.bounds(u.shape[1])
         return np.maximum(0.0, np.maximum(lower - u, u - upper)).max(axis=1, initial=0.0)
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape
 from dmoc.parts.rows import Row
 
@@ -62,6 +63,31 @@ class Constraint(ABC):
     def speed_rows(self, v: Any) -> list[Row]:
         """Rows that hold at the Gauss points of every step and at both ends."""
         return []
+
+    def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
+        """Rows that hold at every node, of a body as effects see it: those of its position by default."""
+        return self.rows(t, body.position, u, m)
+
+    def speed_rows_of(self, body: Body) -> list[Row]:
+        """Rows that hold at the Gauss points and at both ends: those of its velocity by default."""
+        return self.speed_rows(body.velocity)
+
+    def seen(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The part of coordinates and independent velocities, one row each, that `excess` takes.
+
+        Those of the position by default: the first three of a body that turns.
+        """
+        return q[:, :3], v[:, :3]
+
+    @property
+    def turns_body(self) -> bool:
+        """Whether it looks at the attitude, so that it limits rigid bodies alone."""
+        return False
+
+    @property
+    def moves_body(self) -> bool:
+        """Whether it needs a body with a position."""
+        return True
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         """Plain bounds of the position [m]."""

@@ -17,8 +17,8 @@ from dmoc.parts.rows import Row
 STANDARD_GRAVITY = 9.80665
 
 
-class _Burner(Actuator):
-    """The fields and methods that engines and nozzles share: exhaust velocity, dry mass, mass flow."""
+class Burner(Actuator):
+    """The fields and methods that engines, nozzles and thrusters share: exhaust velocity, dry mass, mass flow."""
 
     exhaust_velocity: float | None
     dry_mass: float
@@ -61,7 +61,7 @@ class _Burner(Actuator):
 
 
 @dataclass(frozen=True)
-class Engine(_Burner):
+class Engine(Burner):
     """A thrust vector of limited magnitude, |F| <= max_thrust, that burns |F| / exhaust_velocity [kg/s].
 
     The controls of a node are the force and its magnitude, the throttle, tied together by
@@ -166,7 +166,7 @@ class Engine(_Burner):
 
 
 @dataclass(frozen=True)
-class Nozzles(_Burner):
+class Nozzles(Burner):
     """Fixed nozzles, each with a thrust between 0 and its largest: F = sum_i u_i direction_i.
 
     Parameters

@@ -82,6 +82,10 @@ class Objective(ABC):
             raise ValueError(f"only objectives can be taken away from an objective; got {short(other)}")
         return WeightedSum((*self.terms, *(-1.0 * other).terms))
 
+    # Whether it looks at the attitude of a body, and whether it needs its position.
+    turns_body: ClassVar[bool] = False
+    moves_body: ClassVar[bool] = False
+
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the objective has no meaning in this many dimensions."""
 
@@ -118,8 +122,10 @@ class Effort(Objective):
     unit: ClassVar[str] = "N^2 s"
 
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
-        force = actuator.force(u)
-        return 0.5 * ca.dot(force, force)
+        return 0.5 * actuator.effort(u)
+
+    def unit_with(self, actuator: Actuator) -> str:
+        return actuator.effort_unit
 
 
 @dataclass(frozen=True)
@@ -170,6 +176,7 @@ class FinalRadius(Objective):
     center: Vector | None = None
     unit: ClassVar[str] = "m"
     sense: ClassVar[int] = -1
+    moves_body: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.center is not None:
@@ -199,6 +206,7 @@ class FinalHeight(Objective):
     axis: int = -1
     unit: ClassVar[str] = "m"
     sense: ClassVar[int] = -1
+    moves_body: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checked(self, axis=whole("FinalHeight: axis", self.axis, least=-3))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dmoc.motion.configuration import places_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.constraint import Constraint
@@ -66,25 +67,28 @@ def cuts(
     ----------
     constraints : sequence of Constraint
     path : DiscretePath
-    velocity : array, shape (nodes, axes)
-        Velocity at every node [m/s].
+    velocity : array, shape (nodes, coordinates)
+        dq/dt at every node, that of places in [m/s].
     extent, speed : float
         The scales of the path [m], [m/s].
     """
-    if not constraints:
+    if not constraints or not path.place.size:
         return
-    longest = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).max())
+    velocity = velocity[:, places_in(path.parts)]
+    longest = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).max())
     inside, chord, moving, straight = _inside_gaps(constraints, path, velocity, longest)
     bend = _most(np.linalg.norm(inside - chord, axis=1))
     sway = _most(np.linalg.norm(moving - straight, axis=1)) + 0.5 * _bump(path, velocity)
     still, none = np.zeros_like(inside), np.empty(0, int)
     for i, constraint in enumerate(constraints):
+        if constraint.turns_body:
+            continue
         name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
         if constraint.limits_speed:
             allowed = BOUND * speed + min(sway, DEEPEST * speed)
             yield Cut(name, i, _most(constraint.excess(inside, moving)), allowed, "m/s", none)
             continue
-        at_nodes = _most(constraint.excess(path.position, velocity))
+        at_nodes = _most(constraint.excess(path.place, velocity))
         yield Cut(f"{name} at nodes", i, at_nodes, BOUND * extent, unit, none)
         size = constraint.feature()
         # A zone that tells no size is judged by how deep the chords themselves cut into it.
@@ -109,7 +113,7 @@ def _inside_gaps(
     The path is the cubic that has the positions and velocities of both nodes; it is looked at often
     enough not to step over a zone that is smaller than the longest gap [m].
     """
-    q = path.position
+    q = path.place
     tau = path.duration * np.diff(path.fractions)[:, None, None]
     smallest = min(constraint.feature() for constraint in constraints)
     parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.march import force_of
+from dmoc.motion.march import wrench_of
 from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
@@ -30,10 +31,11 @@ def change(
 ) -> tuple[float, float]:
     """Relative change of path and objective from one mesh to the next, at the step ends they share."""
     shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
-    moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max()
+    moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max(axis=0)
     stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
     scale = max(abs(fine[1]), TINY)
-    return max(float(moved) / path_scales(fine[0])[0], stretched), abs(fine[1] - coarse[1]) / scale
+    moved = float((moved / path_scales(fine[0]).coordinates).max())
+    return max(moved, stretched), abs(fine[1] - coarse[1]) / scale
 
 
 def estimate(
@@ -50,18 +52,17 @@ def estimate(
     """
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
-    extent, speed = path_scales(path)
-    miss, slip = goal_miss(dynamics, path, problem.start_time)
+    missed = path_scales(path).share(*goal_miss(dynamics, path, problem.start_time))
     cost += idle_share(dynamics, path)
-    return Error(moved, cost, max(miss / extent, slip / speed))
+    return Error(moved, cost, missed)
 
 
 def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
     """The part of the impulse that is paid for and not flown [-]: in a step where a control switches.
 
-    Zero where the controls do not tell what is paid.
+    Zero where no throttle among the controls is paid for in place of the force itself.
     """
-    if path.hold or dynamics.actuator.throttle(path.control[0]) is None:
+    if path.hold or dynamics.actuator.smoothing is None:
         return 0.0
     known = flown(dynamics, path)
     middle = 0.5 * (known.mesh[1:] + known.mesh[:-1])
@@ -69,7 +70,10 @@ def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
     h = np.diff(known.mesh)
     rule, many = scheme(path.order), scheme(8)
     fine = np.einsum("pj,jkn->pkn", rule.values_at(many.points), known.nodes)
-    thrust = np.linalg.norm(force_of(dynamics, fine.reshape(-1, fine.shape[2])), axis=1).reshape(fine.shape[:2])
+    controls = fine.reshape(-1, fine.shape[2])
+    # The magnitude of such a force does not hang on the place.
+    anywhere = np.repeat(path.position[:1], len(controls), axis=0)
+    thrust = np.linalg.norm(wrench_of(dynamics, anywhere, controls), axis=1).reshape(fine.shape[:2])
     u = ca.SX.sym("u", fine.shape[2])
     throttle = ca.Function("throttle", [u], [dynamics.actuator.throttle(u)])
     paid = throttle(fine.reshape(-1, fine.shape[2]).T).full().reshape(fine.shape[:2])
@@ -100,7 +104,7 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
     rule, fine = scheme(path.order), scheme(8)
     n, steps = dynamics.positions, len(path.mesh) - 1
     momentum, _ = end_momenta(dynamics, path, start_time)
-    extent, speed = path_scales(path)
+    scales = path_scales(path)
     states = np.concatenate([path.position[:: rule.degree], momentum], axis=1)
     now = states[:-1]
     at = step_nodes(steps, rule)
@@ -119,5 +123,8 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
         q, p = (now[:, :n] - origin).T, now[:, n:].T
         moves = march(q, p, mass, control, times[None], 0.5 * h[None], origin)
         now = now + np.array(np.vstack([np.array(moves[0]), np.array(moves[1])])).T
-    gap = np.abs(states[1:] - now) / np.repeat([extent, speed], n)
+    # The spin of a body is judged by its largest along the path.
+    spin = np.abs(momentum).max() or 1.0
+    momenta = np.where(speeds_in(path.parts), scales.speed, spin)
+    gap = np.abs(states[1:] - now) / np.concatenate([scales.coordinates, momenta])
     return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)

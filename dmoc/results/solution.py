@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.motion.configuration import speeds_in
 from dmoc.motion.path import COSTATE, DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.table import read, write
@@ -42,6 +43,11 @@ class Solution:
         At the step ends, from the discrete Legendre transforms [m/s]; momentum is per unit mass.
     costate : array, shape (nodes, axes)
         Multipliers of the discrete Euler-Lagrange equations [unit of the objective per m/s].
+    rate, spin, torque : arrays, shape (steps+1 or nodes, 3), or None
+        Of a rigid body, in body axes: angular rate [rad/s] and angular momentum per unit mass [m^2/s] at the
+        step ends, and torque of the actuator about the centre of mass [N m] where `force` is given.
+    attitude : array, shape (nodes, 4), or None
+        Of a rigid body: unit quaternion from body to space, scalar first.
     success : bool
         Whether what was asked for was found: a local optimum, to the tolerance if one was given.
     status, message : str
@@ -73,6 +79,9 @@ class Solution:
     tolerance: float | None = None
     error: Error | None = None
     reason: str = ""
+    rate: np.ndarray | None = None
+    spin: np.ndarray | None = None
+    torque: np.ndarray | None = None
     provenance: Provenance = field(kw_only=True)
 
     @property
@@ -94,8 +103,8 @@ class Solution:
 
     @property
     def dimension(self) -> int:
-        """Number of axes, 1 to 3."""
-        return self.path.position.shape[1]
+        """Number of axes, 1 to 3; 0 for an attitude alone."""
+        return self.path.place.shape[1]
 
     @property
     def duration(self) -> float:
@@ -114,7 +123,11 @@ class Solution:
     @property
     def position(self) -> np.ndarray:
         """Positions of the nodes [m], shape (nodes, axes)."""
-        return self.path.position
+        return self.path.place
+
+    @property
+    def attitude(self) -> np.ndarray | None:
+        return self.path.attitudes[0] if self.path.attitudes else None
 
     @property
     def final_mass(self) -> float:
@@ -182,8 +195,10 @@ class Solution:
             If the problem has another dimension, number of controls or start time than the solution.
         """
         of_kind("problem", problem, TransferProblem)
+        axes = problem.dimension if problem.start.has_position else 0
         facts = (
-            ("dimension", self.dimension, problem.dimension, ""),
+            ("dimension", self.dimension, axes, ""),
+            ("number of attitudes", len(self.path.attitudes), 0 if problem.inertia is None else 1, ""),
             ("number of controls", self.path.control.shape[1], problem.controls, ""),
             ("start time", self.provenance.start_time, problem.start_time, " s"),
         )
@@ -213,6 +228,17 @@ class Solution:
             If the folder does not exist.
         """
         write(replace(self, provenance=replace(self.provenance, **provenance)), path)
+
+
+def reported(path: DiscretePath, velocity: np.ndarray, momentum: np.ndarray, force: np.ndarray) -> dict:
+    """The fields of a solution for independent velocities, momenta and what the actuator does, one row each."""
+    speeds = speeds_in(path.parts)
+    places = {"velocity": velocity, "momentum": momentum, "force": force}
+    found = {name: values[:, speeds] for name, values in places.items()}
+    if speeds.all():
+        return found
+    turns = {"rate": velocity, "spin": momentum, "torque": force}
+    return found | {name: values[:, ~speeds] for name, values in turns.items()}
 
 
 def load(path: str | os.PathLike) -> Solution:

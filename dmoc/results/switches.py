@@ -63,9 +63,8 @@ def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> n
     A limit acts in a step if loosening it by its own size would change the objective by a millionth.
     A throttle with |F| rounded at zero never quite reaches its lower limit: there only jumps count.
     """
-    extent, _ = path_scales(path)
-    limit = 0.0 if problem.actuator.smoothing is not None else problem.actuator.force_limit() or 0.0
-    sizes = {Key("control", "column", "force"): limit, POSITION_BOUNDS: extent}
+    limit = 0.0 if problem.actuator.smoothing is not None else problem.actuator.main_limit() or 0.0
+    sizes = {Key("control", "column", "force"): limit, POSITION_BOUNDS: path_scales(path).extent}
     found, steps = [control_jumps(problem, path)], len(path.mesh) - 1
     for key, density in path.multipliers.items():
         if key.kind not in ("node", "control", "step"):
@@ -86,9 +85,9 @@ def control_jumps(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """Steps within which a limited control goes from near one of its limits to near another."""
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
     control = path.control
-    if problem.actuator.force_limit() is None or len(control) < 3:
+    if problem.actuator.main_limit() is None or len(control) < 3:
         return np.empty(0, int)
-    span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.force_limit() or 1.0))
+    span = np.where(np.isfinite(upper - lower), upper - lower, 2 * (problem.actuator.main_limit() or 1.0))
     ends = control if path.hold else control[:: path.order // 2]
     change = (np.abs(np.diff(ends, axis=0)) / span).max(axis=1)
     # A jump takes one step, or two with a node in its middle; a change that goes on beyond them is a steep

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.files import AGAIN
+from dmoc.motion.configuration import QUATERNION, speeds_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance
@@ -75,21 +76,31 @@ def to_dataset(solution: Any) -> Any:
 def _variables(solution: Any) -> Table:
     path, about = solution.path, solution.provenance
     at = "step" if path.hold else "node"
-    between = ", held over each step" if path.hold else BETWEEN
+    between, speeds = ", held over each step" if path.hold else BETWEEN, speeds_in(path.parts)
     control_unit = ", ".join(dict.fromkeys(about.control_units))
     table = {
         "time": (("node",), solution.time, "s", "time"),
         "end_time": (("end",), solution.end_times, "s", "time of the step ends"),
         "mesh": (("end",), path.mesh, "1", "step ends as fractions of the duration"),
-        "position": (("node", "axis"), path.position, "m", "position"),
+        "position": (("node", "axis"), path.place, "m", "position"),
         "velocity": (("end", "axis"), solution.velocity, "m/s", "velocity from the discrete momenta"),
         "momentum": (("end", "axis"), solution.momentum, "m/s", "discrete momentum per unit mass"),
         "force": ((at, "axis"), solution.force, "N", f"force of the actuator{between}"),
         "control": ((at, "channel"), path.control, control_unit, f"control{between}"),
         "mass": (("node",), path.mass, "kg", "mass"),
-        "start_velocity": (("axis",), path.start_velocity, "m/s", "velocity at the start"),
-        "goal_velocity": (("axis",), path.goal_velocity, "m/s", "velocity at the goal"),
+        "start_velocity": (("axis",), path.start_velocity[speeds], "m/s", "velocity at the start"),
+        "goal_velocity": (("axis",), path.goal_velocity[speeds], "m/s", "velocity at the goal"),
     }
+    if path.attitudes:
+        table |= {
+            "attitude": (("node", "quaternion"), solution.attitude, "1", "unit quaternion, body to space"),
+            "rate": (("end", "body_axis"), solution.rate, "rad/s", "angular rate in body axes"),
+            "spin": (("end", "body_axis"), solution.spin, "m2/s", "angular momentum per unit mass, body axes"),
+            "torque": ((at, "body_axis"), solution.torque, "N m", f"torque in body axes{between}"),
+            "start_rate": (("body_axis",), path.start_velocity[~speeds], "rad/s", "rate at the start"),
+            "goal_rate": (("body_axis",), path.goal_velocity[~speeds], "rad/s", "rate at the goal"),
+            "reaction": (("node", "constraint"), path.reaction, "m2/s2", "force of the constraint per unit mass"),
+        }
     variables: Table = {
         name: (dims, values, {"units": unit, "long_name": words})
         for name, (dims, values, unit, words) in table.items()
@@ -97,6 +108,11 @@ def _variables(solution: Any) -> Table:
     labels = {"axis": list("xyz"[: solution.dimension]), "channel": list(about.control_labels)}
     coordinates = {name: ((name,), np.array(values, object), {"units": "1"}) for name, values in labels.items()}
     return variables | _multipliers(solution) | coordinates
+
+
+def _turning(table: Table) -> dict[str, np.ndarray]:
+    """What a file holds of a body that turns."""
+    return {name: _array(table, name) for name in ("rate", "spin", "torque") if "attitude" in table}
 
 
 def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
@@ -118,23 +134,33 @@ def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
         tolerance=json.loads(facts["tolerance"]),
         error=Error(**error) if (error := json.loads(facts["error"])) else None,
         reason=str(facts["reason"]),
+        **_turning(table),
         provenance=_provenance(facts, table),
     )
 
 
 def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
     groups = [name for name in table if name.startswith("multiplier_")]
+    names = ("position", "attitude"), ("start_velocity", "start_rate"), ("goal_velocity", "goal_rate")
+    turns = "attitude" in table
+    position, start, goal = (
+        np.concatenate([_array(table, name) for name in pair[: 1 + turns]], axis=-1) for pair in names
+    )
+    axes = _array(table, "position").shape[1]
+    blocks = () if not turns else (axes, QUATERNION) if axes else (QUATERNION,)
     return DiscretePath(
         _array(table, "mesh"),
         int(facts["order"]),
         bool(facts["hold"]),
         float(facts["duration"]),
-        _array(table, "position"),
+        position,
         _array(table, "control"),
         _array(table, "mass"),
-        _array(table, "start_velocity"),
-        _array(table, "goal_velocity"),
+        start,
+        goal,
         {Key.parse(str(table[name][2]["key"])): _array(table, name) for name in groups},
+        blocks,
+        _array(table, "reaction") if turns else None,
     )
 
 
@@ -246,15 +272,20 @@ def _check_shapes(solution: Any) -> Any:
     nodes = solution.steps * degree + 1
     controls = solution.steps if path.hold else nodes
     shapes = {
-        "position": (path.position, (nodes, axes)),
+        "position": (path.place, (nodes, axes)),
         "mass": (path.mass, (nodes,)),
         "control": (path.control, (controls, len(solution.provenance.control_labels))),
         "force": (solution.force, (controls, axes)),
         "velocity": (solution.velocity, (solution.steps + 1, axes)),
         "momentum": (solution.momentum, (solution.steps + 1, axes)),
-        "start_velocity": (path.start_velocity, (axes,)),
-        "goal_velocity": (path.goal_velocity, (axes,)),
+        "start_velocity": (path.start_velocity, (len(speeds_in(path.parts)),)),
+        "goal_velocity": (path.goal_velocity, (len(speeds_in(path.parts)),)),
     }
+    if path.attitudes:
+        turning = {"rate": (solution.rate, solution.steps + 1), "spin": (solution.spin, solution.steps + 1)}
+        turning |= {"torque": (solution.torque, controls)}
+        shapes |= {name: (values, (count, 3)) for name, (values, count) in turning.items()}
+        shapes["attitude"] = (path.attitudes[0], (nodes, QUATERNION))
     for name, (values, wanted) in shapes.items():
         if values.shape != wanted:
             raise ValueError(f"{name} has shape {values.shape} where {wanted} belongs")

@@ -67,6 +67,25 @@ class Boundary(ABC):
         """The type and all that is built into the rows: equal for boundaries that one NLP can serve."""
         return (type(self),)
 
+    @property
+    def has_position(self) -> bool:
+        """Whether it says where the body is; an attitude alone does not."""
+        return True
+
+    @property
+    def turns_body(self) -> bool:
+        """Whether it says how the body is turned, too."""
+        return False
+
+    @property
+    def point(self) -> Boundary:
+        """The same for a point mass: without the attitude."""
+        return self
+
+    def oriented(self, start: Boundary) -> Boundary:
+        """The same goal, told which of the two quaternions of an attitude the way from a start leads to."""
+        return self
+
     def with_dimension(self, dimension: int) -> Boundary:
         """The same boundary with this number of axes, if its own `dimension` is 0; else itself."""
         return self

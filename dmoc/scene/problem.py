@@ -20,6 +20,7 @@ from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
+from dmoc.scene.poses import checked_inertia
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -52,6 +53,9 @@ class TransferProblem:
         (count, controls), or a former solution.
     start_time : float
         Time at the start [s].
+    inertia : 3 floats or 3x3 floats, optional
+        Inertia of the body in body axes about its centre of mass [kg m^2], principal moments or a matrix: with
+        it the body turns, and its ends are `Pose` or, for the attitude alone, `Attitude`.
     name, parameters
         Provenance, set when the problem is loaded from a file.
 
@@ -71,6 +75,7 @@ class TransferProblem:
     constraints: Sequence[Constraint] = ()
     guess: Any = None
     start_time: float = 0.0
+    inertia: Any = None
     name: str = field(default="problem", compare=False)
     parameters: dict = field(default_factory=dict, compare=False)
 
@@ -91,6 +96,7 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        self._check_turning()
         self._complete_ends()
         if self.objective.metered:
             checked(self, actuator=self.actuator.metered(self.dimension))
@@ -101,6 +107,7 @@ class TransferProblem:
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
         for part in parts:
             part.check_dimension(self.dimension)
+            self._check_body(part)
         self._check_clock()
         _check_functions(self)
         self._check_objective()
@@ -135,7 +142,7 @@ class TransferProblem:
     @property
     def limited(self) -> bool:
         """Whether there are inequalities: limits of the actuator or constraints."""
-        return bool(self.constraints) or self.actuator.force_limit() is not None
+        return bool(self.constraints) or self.actuator.limited
 
     @property
     def free_duration(self) -> bool:
@@ -166,6 +173,38 @@ class TransferProblem:
         for end in ("start", "goal"):
             checked(self, **{end: getattr(self, end).with_dimension(dimension)})
 
+    def _check_turning(self) -> None:
+        """A body with an inertia turns, and both its ends say how."""
+        turning = {end: getattr(self, end).turns_body for end in ("start", "goal")}
+        if self.inertia is None:
+            if any(turning.values()):
+                raise ValueError(
+                    "a body with an attitude needs its inertia [kg m^2]: give inertia=(Jx, Jy, Jz) about its "
+                    "principal axes, or a matrix of three rows"
+                )
+            return
+        checked(self, inertia=checked_inertia(self.inertia))
+        for end, turns in turning.items():
+            if not turns:
+                raise ValueError(
+                    f"a body with an inertia turns, but its {end} has no attitude: use Pose(position, velocity, "
+                    "attitude, rate) or Attitude(quaternion, rate)"
+                )
+        if self.start.has_position != self.goal.has_position:
+            raise ValueError("one end is a Pose and the other an Attitude; use the same for both")
+        checked(self, goal=self.goal.oriented(self.start))
+
+    def _check_body(self, part: Any) -> None:
+        """A part that turns the body needs one that turns; one that moves it needs a position."""
+        if part.turns_body and self.inertia is None:
+            raise ValueError(
+                f"{type(part).__name__} acts on a body that turns; give the problem an inertia [kg m^2] and ends "
+                "with an attitude, Pose or Attitude"
+            )
+        if part.moves_body and not self.start.has_position:
+            remedy = "use Torque()" if part is self.actuator else "leave it out, or give the ends a position (Pose)"
+            raise ValueError(f"{type(part).__name__} acts on a position, but the ends are attitudes alone; {remedy}")
+
     def _check_clock(self) -> None:
         """Times of a transfer must differ by more than the rounding of the clock."""
         shortest = self.duration_bounds[0]
@@ -181,11 +220,12 @@ class TransferProblem:
         for end in ("start", "goal"):
             position, velocity = getattr(self, end).fixed()
             for i, constraint in enumerate(self.constraints):
-                known = velocity if constraint.limits_speed else position
+                state = constraint.seen(position[None], velocity[None])
+                known = state[1] if constraint.limits_speed else state[0]
                 if np.isnan(known).any():
                     continue
                 # A state on the limit itself may lie beyond it by the rounding of its own numbers.
-                excess = float(constraint.excess(position[None], velocity[None])[0])
+                excess = float(constraint.excess(*state)[0])
                 if excess > 1e-9 * (np.abs(known).max() or 1.0):
                     name = f"{type(constraint).__name__} (constraint {i + 1})"
                     raise ValueError(
@@ -208,7 +248,7 @@ class TransferProblem:
                 f"least time needs a free duration; got {given:g} s: give (shortest, longest), "
                 f"for example ({0.1 * given:g}, {10 * given:g})"
             )
-        if self.actuator.force_limit() is None:
+        if not self.actuator.limited:
             raise ValueError(
                 "least time without a force limit has no optimum (the duration goes to 0 s); "
                 "use BoxForce(limit) or BallForce(limit)"

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 
-from dmoc.effects.base import Conservative, Effect
-from dmoc.motion.configuration import Translation
+from dmoc.effects.base import Effect
+from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
+from dmoc.motion.momenta import velocity_along
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP
@@ -31,9 +34,9 @@ def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess:
         With the effect, the node and the arguments that the effect had there.
     """
     with np.errstate(all="ignore"):
-        state = _states(problem, guess)
+        state = _states(dynamics, problem, guess)
         if not all(np.isfinite(value.full()).all() for value in dynamics.point(*state)):
-            raise ValueError(_undefined_effect(problem, state))
+            raise ValueError(_undefined_effect(dynamics, problem, state))
 
 
 def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePath) -> None:
@@ -56,22 +59,23 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePat
     raise ValueError(f"{name} or its derivative is not a finite number at the guess; {REMEDY}")
 
 
-def _states(problem: TransferProblem, guess: DiscretePath) -> tuple[np.ndarray, ...]:
-    """Times, positions, velocities, masses of the nodes of a guess, side by side."""
+def _states(dynamics: Dynamics, problem: TransferProblem, guess: DiscretePath) -> tuple[np.ndarray, ...]:
+    """Times, positions, dq/dt, masses of the nodes of a guess, side by side."""
     times = problem.start_time + guess.duration * guess.fractions
     velocity = np.gradient(guess.position, times, axis=0)
-    velocity[0], velocity[-1] = guess.start_velocity, guess.goal_velocity
+    ends = np.array([guess.start_velocity, guess.goal_velocity])
+    velocity[[0, -1]] = velocity_along(dynamics, guess.position[[0, -1]], ends)
     return times[None], guess.position.T, velocity.T, guess.mass[None]
 
 
-def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
+def _undefined_effect(dynamics: Dynamics, problem: TransferProblem, state: tuple) -> str:
     """Which effect has no value, and at which node."""
     for effect in problem.effects:
-        point = Dynamics(Translation(problem.dimension), (effect,)).point(*state)
+        point = replace(dynamics, effects=(effect,)).point(*state)
         finite = np.isfinite(np.vstack([value.full() for value in point])).all(axis=0)
         if not finite.all():
             node = int(np.argmin(finite))
-            where = _arguments(effect, [part[:, node] for part in state])
+            where = _arguments(dynamics, effect, [part[:, node] for part in state])
             place = {0: "at the start", finite.size - 1: "at the goal"}.get(
                 node, f"at node {node} of the guess"
             )
@@ -79,16 +83,19 @@ def _undefined_effect(problem: TransferProblem, state: tuple) -> str:
     return f"the effects together are not a finite number at the guess; {REMEDY}"
 
 
-def _arguments(effect: Effect, state: list[np.ndarray]) -> str:
+def _arguments(dynamics: Dynamics, effect: Effect, state: list[np.ndarray]) -> str:
     """The arguments that an effect depends on, in words; the distance to its centre alone where that is 0."""
-    position = state[1]
+    body = dynamics.configuration
+    position = state[1][places_in(body.blocks)]
     center = getattr(effect, "center", None)
     offset = position - (
         np.zeros(len(position)) if center is None else np.asarray(center, float)[: len(position)]
     )
-    symbols = state_symbols(len(position))
-    value = effect.lagrangian(*symbols) if isinstance(effect, Conservative) else effect.force(*symbols)  # type: ignore[attr-defined]
-    looks = [ca.depends_on(ca.SX(value), symbol) for symbol in symbols]
+    symbols = state_symbols(body.size)
+    t, q, v, m = symbols
+    seen = body.body(q, v)
+    acts = [effect.lagrangian_of(t, seen, m), *effect.wrench_of(t, seen, m)]
+    looks = [any(ca.depends_on(ca.SX(act), one) for act in acts if act is not None) for one in symbols]
     distance = float(np.linalg.norm(offset))
     if looks[1] and distance <= 1e-12 * (1 + np.abs(position).max()):
         return f"distance {distance:.2g} m from {_listed(position - offset)} m"
@@ -119,7 +126,7 @@ def worst_in_units(nlp: NLP, problem: TransferProblem, x, g) -> tuple[tuple[str,
                 value = scaled / group.scales[index, component]
                 size, unit = _row(nlp, problem, group, index, component, value, duration)
             else:
-                size, unit = value, _unit_of_unknown(problem, group, component)
+                size, unit = value, _unit_of_unknown(nlp, problem, group, component)
             found.append((group.name_of(place), float(size), unit))
     return tuple(found)
 
@@ -131,13 +138,19 @@ def _row(
     if group.owner is None and group.kind == "smooth":
         # A row of motion is a momentum per mass; over the node's share of the time it is a force.
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
-        return value * problem.mass / weight, "N"
+        unit = "N" if places_in(nlp.dynamics.configuration.blocks)[component] else "N m"
+        return value * problem.mass / weight, unit
     unit = group.units[component]
     if group.owner is None or group.owner.field in ("start", "goal"):
         return value, unit or "-"
     return group.owner.of(problem).violation(value, unit)
 
 
-def _unit_of_unknown(problem: TransferProblem, group: Group, component: int) -> str:
-    units = {"position": "m", "mass": "kg", "duration": "s", "start.velocity": "m/s", "goal.velocity": "m/s"}
+def _unit_of_unknown(nlp: NLP, problem: TransferProblem, group: Group, component: int) -> str:
+    blocks = nlp.dynamics.configuration.blocks
+    if group.name == "position":
+        return "m" if places_in(blocks)[component] else "-"
+    if group.name.endswith(".velocity"):
+        return "m/s" if speeds_in(blocks)[component] else "rad/s"
+    units = {"mass": "kg", "duration": "s", "reaction": "m^2/s^2"}
     return units.get(group.name) or problem.actuator.units(problem.dimension)[component]

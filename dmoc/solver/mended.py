@@ -9,8 +9,9 @@ import numpy as np
 
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.momenta import end_momenta, node_velocities
-from dmoc.motion.path import DiscretePath
+from dmoc.motion.configuration import speeds_in
+from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
+from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.motion.reference import MISSED, goal_miss
 from dmoc.results.between import Cut, cuts
 from dmoc.solver.ladder import HOPELESS, UNEXPLAINED, Ladder
@@ -153,8 +154,9 @@ def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
     Infinite where the motion cannot be integrated.
     """
     _, extent, speed = _velocity(ladder, path)
-    miss, slip = goal_miss(ladder.dynamics, path, ladder.problem.start_time)
-    return float(np.nan_to_num(max(miss / extent, slip / speed), nan=np.inf))
+    scales = replace(path_scales(path), extent=extent, speed=speed)
+    missed = scales.share(*goal_miss(ladder.dynamics, path, ladder.problem.start_time))
+    return float(np.nan_to_num(missed, nan=np.inf))
 
 
 def _sharpened(ladder: Ladder, guess: DiscretePath) -> Rung:
@@ -196,9 +198,9 @@ def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
 def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:
     """Velocities at the nodes [m/s], and the scales of a path, its extent [m] and its largest speed [m/s]."""
     _, ends = end_momenta(ladder.dynamics, path, ladder.problem.start_time)
-    extent = path.diagonal or 1.0
-    speed = max(float(np.linalg.norm(ends, axis=1).max()), extent / path.duration)
-    return node_velocities(path, ends), extent, speed
+    extent, linear = path.diagonal or 1.0, ends[:, speeds_in(path.parts)]
+    speed = max(float(np.linalg.norm(linear, axis=1).max(initial=0.0)), extent / path.duration)
+    return node_velocities(path, velocity_along(ladder.dynamics, path.position[:: path.order // 2], ends)), extent, speed
 
 
 def _halved(mesh: np.ndarray, left: list[Cut]) -> np.ndarray:

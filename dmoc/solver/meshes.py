@@ -10,6 +10,7 @@ from dmoc.guess.coast import MANY_TURNS, VERY_MANY_TURNS
 from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import flow_matrices
 from dmoc.nlp.transcription import check_mesh
@@ -116,7 +117,7 @@ def guess_on(
 
 def is_uneven(problem: TransferProblem, path: DiscretePath) -> bool:
     """Whether a path comes so much nearer to an attractor that equal steps would be too long there."""
-    rates = problem.attraction.rates(path.position)
+    rates = problem.attraction.rates(path.place)
     return bool(rates.max() > UNEVEN * rates.min())
 
 
@@ -125,7 +126,7 @@ def graded_guess(
 ) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
     fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
-    rates = problem.attraction.rates(fine.position)
+    rates = problem.attraction.rates(fine.place)
     angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
     mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
     return starting_guess(problem, mesh, order, hold, given)
@@ -157,7 +158,10 @@ def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
     """Steps that keep h omega below 1 along a path, omega the fastest rate of the linearised motion."""
     sample = path.onto(uniform_mesh(min(100, len(path.mesh) - 1)), 2, path.hold)
     slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
-    flow, _ = flow_matrices(Dynamics.of(problem), sample, problem.start_time, slopes)
+    dynamics = Dynamics.of(problem)
+    flow, _ = flow_matrices(
+        dynamics, sample, problem.start_time, rates_along(dynamics, sample.position, slopes)
+    )
     rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full(1, np.inf)
     # A mode that dies out need not be followed.
     fastest = max(rates.real.max(), np.abs(rates.imag).max())

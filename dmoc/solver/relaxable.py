@@ -103,14 +103,14 @@ class Relaxable:
     def force(self) -> Giving | None:
         """The limit of the actuator."""
         raised, given = self.problem.actuator, self.given.actuator
-        if raised.force_limit() is None:
+        if not raised.limited:
             return None
 
         def told(slack: float) -> str:
             return given.needs(raised.eased(slack))
 
         def factor(slack: float) -> float:
-            return (raised.eased(slack).force_limit() or 0.0) / (given.force_limit() or 1.0)
+            return (raised.eased(slack).main_limit() or 0.0) / (given.main_limit() or 1.0)
 
         groups = [group for group in self._groups() if group.owner and group.owner.field == "actuator"]
         return self._giving(told, factor, groups, self.nlp.columns["force"].indices.ravel(), falls=2)

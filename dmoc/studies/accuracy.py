@@ -18,7 +18,8 @@ from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.motion.path import DiscretePath, Scales, path_scales
+from dmoc.motion.reference import apart
 from dmoc.motion.reference import reference as fly
 from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
@@ -200,7 +201,7 @@ def _checked_meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str
     return meshes
 
 
-def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: tuple) -> Trial:
+def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: Scales) -> Trial:
     (name, order, steps, climbs), (value, doubt) = labels, known
     last, solve_s = timed[-1], median(run.solve_s for run in timed)
     return Trial(
@@ -283,11 +284,10 @@ def _own(problem: TransferProblem, order: int, steps: int, climbs: bool, compile
     return Run(found.path, len(found.path.control), *facts, calls, seconds, found.solve_s)
 
 
-def _miss(problem: TransferProblem, path: DiscretePath | None, scales: tuple[float, float]) -> float:
+def _miss(problem: TransferProblem, path: DiscretePath | None, scales: Scales) -> float:
     """By how much the independent integrator misses the goal of a path, of an extent [m] or speed [m/s]."""
     if path is None or not np.isfinite(path.control).all():
         return np.nan
     dynamics = Dynamics.of(problem)
     position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
-    gaps = np.linalg.norm(position - path.position[-1]), np.linalg.norm(velocity - path.goal_velocity)
-    return float(max(gaps[0] / scales[0], gaps[1] / scales[1]))
+    return scales.share(apart(path.parts, position, path.position[-1]), velocity - path.goal_velocity)

@@ -1,0 +1,125 @@
+"""The path to start from of a body that turns: a slerp between its attitudes, beside the path of its centre."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import short
+from dmoc.basics.quaternions import angle_between, in_one_sign, normalised, rotation_vectors, slerp, times
+from dmoc.basics.quaternions import conjugate
+from dmoc.motion.configuration import configuration_of, quaternions_in, speeds_in
+from dmoc.motion.path import DiscretePath
+from dmoc.parts.forces import BallForce, FreeForce
+from dmoc.parts.objectives import Effort
+from dmoc.scene.problem import TransferProblem
+
+# The attitude of a body of which neither end says how it is turned.
+UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
+# A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
+LEISURE = 1.2
+
+
+def turning_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
+    """Attitude and rate of start and of goal, with likely values for what is free."""
+    ends = (problem.start, problem.goal)
+    times_there = (problem.start_time, problem.start_time + duration)
+    found = []
+    for end, at in zip(ends, times_there, strict=True):
+        position, velocity = end.estimate(at)
+        found.append((position[-4:], velocity[-3:]))
+    (q0, w0), (q1, w1) = found
+    if np.isnan(q0).any():
+        q0 = UNTURNED if np.isnan(q1).any() else q1
+    if np.isnan(q1).any():
+        q1 = q0
+    # A goal that is fixed has its sign from the problem; one that moves takes the shorter way.
+    if np.isnan(problem.goal.fixed()[0][-4:]).any() and q0 @ q1 < 0:
+        q1 = -q1
+    mean = 2 * np.arctan2(np.linalg.norm(q1 - q0), np.linalg.norm(q1 + q0)) * 2 / duration
+    axis = rotation_vectors(times(conjugate(q0), q1))
+    size = float(np.linalg.norm(axis))
+    rate = mean * axis / size * (1 if q0 @ q1 >= 0 else -1) if size else np.zeros(3)
+    return q0, np.where(np.isnan(w0), rate, w0), q1, np.where(np.isnan(w1), rate, w1)
+
+
+def turning_duration(problem: TransferProblem) -> float:
+    """A likely duration of a turn at the limit of torque [s], within the bounds; the middle of them without one."""
+    shortest, longest = problem.duration_bounds
+    middle = float(np.sqrt(shortest * longest))
+    limit = problem.actuator.turning_limit()
+    if limit is None or not problem.free_duration:
+        return middle
+    q0, w0, q1, w1 = turning_states(problem, middle)
+    acceleration = limit / (float(np.trace(np.array(problem.inertia))) / 3)
+    angle = float(angle_between(q0, q1))
+    needed = 2 * np.sqrt(angle / acceleration) + float(np.linalg.norm(w1 - w0)) / acceleration
+    return float(np.clip(LEISURE * needed, shortest, longest)) if needed > 0 else middle
+
+
+def as_point(problem: TransferProblem) -> TransferProblem:
+    """The same transfer for a point mass: what moves the centre of the body, without its attitude."""
+    limit = problem.actuator.force_limit()
+    return TransferProblem(
+        problem.mass,
+        problem.start.point,
+        problem.goal.point,
+        problem.duration,
+        effects=[effect for effect in problem.effects if not effect.turns_body],
+        actuator=FreeForce() if limit is None else BallForce(limit),
+        objective=Effort(),
+        constraints=[constraint for constraint in problem.constraints if not constraint.turns_body],
+        start_time=problem.start_time,
+    )
+
+
+def checked_turning(problem: TransferProblem, given: Any, fractions: np.ndarray, times_at: np.ndarray) -> np.ndarray:
+    """Coordinates along a user's own guess, attitudes made unit quaternions of one sign.
+
+    Raises
+    ------
+    ValueError
+        If it has another number of coordinates, or cannot be evaluated.
+    """
+    body = configuration_of(problem)
+    names = ", ".join(body.names)
+    try:
+        if callable(given):
+            position = np.array([np.atleast_1d(np.asarray(given(time), float)) for time in times_at])
+        else:
+            known, values = (np.asarray(part, float) for part in given[:2])
+            position = np.stack([np.interp(times_at, known, column) for column in values.T], axis=1)
+    except Exception as error:  # whatever a user's function raises
+        raise ValueError(
+            f"guess must be a function of time [s] that gives {names}, arrays (times, coordinates) or a former "
+            f"solution; {short(given)} fails: {' '.join(str(error).split())[:120]}"
+        ) from error
+    if position.shape != (len(fractions), body.size) or not np.isfinite(position).all():
+        raise ValueError(f"guess must give {body.size} finite coordinates, {names}; it gives {position.shape[-1]}")
+    for at in quaternions_in(body.blocks):
+        position[:, at] = in_one_sign(normalised(position[:, at]))
+        goal = problem.goal.fixed()[0][at]
+        if float(position[-1, at] @ goal) < 0:
+            position[:, at] *= -1
+    return position
+
+
+def joined(problem: TransferProblem, place: DiscretePath | None, guess: tuple) -> DiscretePath:
+    """The guess of a body from that of its centre, if it has one, and its attitudes and rates at the ends."""
+    mesh, order, hold, duration, position, rates, control = guess
+    start, goal = rates
+    if place is not None:
+        position = np.hstack([place.position, position])
+        start, goal = np.append(place.start_velocity, start), np.append(place.goal_velocity, goal)
+    body = configuration_of(problem)
+    for end, at in ((problem.start, 0), (problem.goal, -1)):
+        known = ~np.isnan(end.fixed()[0])
+        position[at, known] = end.fixed()[0][known]
+    velocities = [
+        np.where(np.isnan(end.fixed()[1]), guessed, end.fixed()[1])
+        for end, guessed in ((problem.start, start), (problem.goal, goal))
+    ]
+    assert len(velocities[0]) == len(speeds_in(body.blocks))
+    mass = np.full(len(position), problem.mass)
+    return DiscretePath(mesh, order, hold, duration, position, control, mass, *velocities, blocks=body.blocks)

@@ -1,0 +1,350 @@
+"""What pushes a body that turns: torques, wrenches, and thrusters fixed to the body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import Vector, checked, entries, flag, limits, number, short, times_each, vector
+from dmoc.basics.digits import up
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.engines import Burner
+
+# A body in space has these many axes.
+AXES = 3
+
+
+class _OnBody(Actuator):
+    """What actuators of rigid bodies share: their controls, squared and added up, are their effort."""
+
+    @property
+    def turns_body(self) -> bool:
+        return True
+
+    @property
+    def moves_body(self) -> bool:
+        return False
+
+    def effort(self, u: Any) -> Any:
+        return ca.dot(u, u)
+
+
+@dataclass(frozen=True)
+class Torque(_OnBody):
+    """A torque in body axes, about the centre of mass: |tau_i| <= limit_i, or without a limit.
+
+    Parameters
+    ----------
+    limit : float or sequence of float, optional
+        Largest torque [N m], one number or one for each body axis; none if not given.
+    """
+
+    limit: float | Vector | None = None
+    effort_unit: ClassVar[str] = "N^2 m^2 s"
+
+    def __post_init__(self) -> None:
+        if self.limit is not None:
+            checked(self, limit=_three("Torque: limit", self.limit, "N m"))
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.limit is None
+
+    def size(self, dimension: int) -> int:
+        return AXES
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return ("tx", "ty", "tz")
+
+    def units(self, dimension: int) -> tuple[str, ...]:
+        return ("N m",) * AXES
+
+    def force(self, u: Any) -> Any:
+        return u
+
+    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
+        return None, u
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        limit = np.broadcast_to(np.inf if self.limit is None else np.asarray(self.limit), (AXES,)).astype(float)
+        return -limit, limit
+
+    def torque_limit(self) -> float | None:
+        return None if self.limit is None else float(np.max(self.limit))
+
+    def times(self, factor: float) -> Torque:
+        return self if self.limit is None else replace(self, limit=times_each(self.limit, factor))
+
+    @property
+    def limit_words(self) -> str:
+        return "torque limit"
+
+    def needs(self, eased: Actuator) -> str:
+        enough = up(eased.torque_limit() or 0.0)
+        return f"a torque limit of {enough} N m (you gave {self.torque_limit():g} N m)"
+
+    def unlimited(self) -> Actuator:
+        return Torque()
+
+    def share(self, u: np.ndarray) -> float:
+        return 0.0 if self.limit is None else float((np.abs(u) / np.asarray(self.limit)).max(initial=0.0))
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        return value * (self.torque_limit() or 1.0), "N m"
+
+    def words(self) -> str:
+        limit = "without a limit" if self.limit is None else f"of at most {_listed(self.limit)} N m about each"
+        return f"a torque in body axes, {limit}"
+
+
+@dataclass(frozen=True, init=False)
+class Wrench(_OnBody):
+    """A force through the centre of mass and a torque, both in body axes.
+
+    Parameters
+    ----------
+    force_limit : float or sequence of float, optional
+        Largest force [N], one number or one for each axis; none if not given.
+    torque_limit : float or sequence of float, optional
+        Largest torque [N m], the same.
+    frame : "body" or "space"
+        The axes of the force; the torque is in body axes.
+    """
+
+    most_force: float | Vector | None = None
+    most_torque: float | Vector | None = None
+    frame: str = "body"
+    effort_unit: ClassVar[str] = "N^2 s"
+
+    def __init__(
+        self,
+        force_limit: float | Vector | None = None,
+        torque_limit: float | Vector | None = None,
+        frame: str = "body",
+    ):
+        checked(self, most_force=force_limit, most_torque=torque_limit, frame=frame)
+        if self.most_force is not None:
+            checked(self, most_force=_three("Wrench: force limit", self.most_force, "N"))
+        if self.most_torque is not None:
+            checked(self, most_torque=_three("Wrench: torque limit", self.most_torque, "N m"))
+        if self.frame not in ("body", "space"):
+            raise ValueError(f"Wrench: frame must be 'body' or 'space'; got {short(self.frame)}")
+
+    @property
+    def moves_body(self) -> bool:
+        return True
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.frame
+
+    def size(self, dimension: int) -> int:
+        return 2 * AXES
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return ("fx", "fy", "fz", "tx", "ty", "tz")
+
+    def units(self, dimension: int) -> tuple[str, ...]:
+        return ("N",) * AXES + ("N m",) * AXES
+
+    def force(self, u: Any) -> Any:
+        return u[:AXES]
+
+    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
+        return (u[:AXES] if self.frame == "space" else rotation @ u[:AXES]), u[AXES:]
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        sides = [
+            np.broadcast_to(np.inf if side is None else np.asarray(side), (AXES,)).astype(float)
+            for side in (self.most_force, self.most_torque)
+        ]
+        limit = np.concatenate(sides)
+        return -limit, limit
+
+    def force_limit(self) -> float | None:
+        return None if self.most_force is None else float(np.max(self.most_force))
+
+    def torque_limit(self) -> float | None:
+        return None if self.most_torque is None else float(np.max(self.most_torque))
+
+    def times(self, factor: float) -> Wrench:
+        force, torque = (
+            None if bound is None else times_each(bound, factor) for bound in (self.most_force, self.most_torque)
+        )
+        return Wrench(force, torque, self.frame)
+
+    @property
+    def limit_words(self) -> str:
+        return "force and torque limit"
+
+    def needs(self, eased: Actuator) -> str:
+        pairs = (
+            (self.force_limit(), eased.force_limit(), "force", "N"),
+            (self.torque_limit(), eased.torque_limit(), "torque", "N m"),
+        )
+        words = [
+            f"a {name} limit of {up(enough or 0.0)} {unit} (you gave {given:g} {unit})"
+            for given, enough, name, unit in pairs
+            if given is not None
+        ]
+        return " and ".join(words)
+
+    def unlimited(self) -> Actuator:
+        return Wrench(frame=self.frame)
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        _, upper = self.bounds(AXES)
+        # Torques count in the unit of the force, each over its own limit.
+        over = np.maximum(0.0, np.abs(u) / upper - 1) * (self.main_limit() or 0.0)
+        return np.nan_to_num(over).max(axis=1, initial=0.0)
+
+    def share(self, u: np.ndarray) -> float:
+        _, upper = self.bounds(AXES)
+        return float((np.abs(u) / upper).max(initial=0.0))
+
+    def words(self) -> str:
+        parts = [
+            f"{name} {'without a limit' if bound is None else f'of at most {_listed(bound)} {unit}'}"
+            for name, bound, unit in (("a force", self.most_force, "N"), ("a torque", self.most_torque, "N m"))
+        ]
+        return f"{' and '.join(parts)}, the force in {self.frame} axes"
+
+
+@dataclass(frozen=True)
+class Thrusters(_OnBody, Burner):
+    """Thrusters fixed to the body, each with a thrust between 0 and its largest.
+
+    The force in body axes is sum_i u_i d_i, the torque about the centre of mass sum_i u_i r_i x d_i. Where they
+    burn propellant, the inertia shrinks in proportion to the mass and the centre of mass stays where it is.
+
+    Parameters
+    ----------
+    positions : sequence of sequences
+        Where each thruster sits, from the centre of mass in body axes [m], one row a thruster.
+    directions : sequence of sequences
+        Direction of the force that each makes, in body axes [-]; made unit vectors.
+    max_thrust : float or sequence of float, optional
+        Largest thrust [N], one number or one a thruster; without a limit only if they push both ways.
+    both_ways : bool
+        Whether each can push against its direction, too.
+    specific_impulse, exhaust_velocity, dry_mass
+        As for `Engine`.
+    """
+
+    positions: Sequence[Vector] | np.ndarray
+    directions: Sequence[Vector] | np.ndarray
+    max_thrust: float | Vector | None = None
+    both_ways: bool = False
+    specific_impulse: float | None = None
+    exhaust_velocity: float | None = None
+    dry_mass: float = 0.0
+    limit_label = "limit of\na thruster"
+
+    def __post_init__(self) -> None:
+        places, ways = _rows("positions", self.positions, "m"), _rows("directions", self.directions, "-")
+        if len(places) != len(ways):
+            raise ValueError(
+                f"Thrusters: there are {len(places)} positions but {len(ways)} directions; give one each a thruster"
+            )
+        lengths = [float(np.linalg.norm(way)) for way in ways]
+        if min(lengths) == 0:
+            raise ValueError(f"Thrusters: directions must not be zero; got {short(self.directions)}")
+        units = tuple(tuple(x / length for x in way) for way, length in zip(ways, lengths, strict=True))
+        checked(self, positions=places, directions=units, both_ways=flag("both_ways", self.both_ways))
+        self._check_thrust(len(units))
+        self._check_exhaust(self.specific_impulse)
+        if self.burns and self.both_ways:
+            raise ValueError("Thrusters: those that burn push one way; state each way as a thruster of its own")
+
+    def _check_thrust(self, count: int) -> None:
+        if self.max_thrust is None:
+            if not self.both_ways:
+                raise ValueError("Thrusters: give max_thrust [N]; only thrusters that push both ways need none")
+            return
+        given = entries(self.max_thrust)
+        thrusts = (self.max_thrust,) * count if given is None else given
+        if len(thrusts) != count:
+            raise ValueError(
+                f"Thrusters: max_thrust has {len(thrusts)} entries but there are {count} thrusters; "
+                f"give one number [N] or {count}"
+            )
+        most = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
+        checked(self, max_thrust=most)
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("exhaust_velocity",) if self.burns else ()
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.burns, self.positions, self.directions
+
+    def size(self, dimension: int) -> int:
+        return len(self.directions)
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return tuple(f"thruster_{i + 1}" for i in range(len(self.directions)))
+
+    def force(self, u: Any) -> Any:
+        return ca.DM(np.array(self.directions).T) @ u
+
+    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
+        arms = np.cross(np.array(self.positions), np.array(self.directions))
+        return rotation @ self.force(u), ca.DM(arms.T) @ u
+
+    def throttle(self, u: Any) -> Any:
+        return ca.sum1(u)
+
+    def metered(self, dimension: int) -> Actuator:
+        if self.both_ways:
+            raise ValueError(
+                "least fuel with Thrusters that push both ways has no smooth cost; state each way as a thruster of "
+                "its own, both_ways=False"
+            )
+        return self
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        limit = np.full(len(self.directions), np.inf) if self.max_thrust is None else np.array(self.max_thrust)
+        return (-limit if self.both_ways else np.zeros(len(limit))), limit
+
+    def force_limit(self) -> float | None:
+        return None if self.max_thrust is None else float(np.max(self.max_thrust))
+
+    def turning_limit(self) -> float | None:
+        if self.max_thrust is None:
+            return None
+        arms = np.cross(np.array(self.positions), np.array(self.directions)) * np.array(self.max_thrust)[:, None]
+        # Of the thrusters that turn the body one way about an axis, all fire: the weakest axis counts.
+        ways = [np.maximum(sign * arms, 0).sum(axis=0) for sign in (1, -1)]
+        weakest = float(np.min(np.maximum(*ways) if self.both_ways else np.minimum(*ways)))
+        return weakest or float(np.linalg.norm(arms, axis=1).max()) or None
+
+    def times(self, factor: float) -> Thrusters:
+        return self if self.max_thrust is None else replace(self, max_thrust=times_each(self.max_thrust, factor))
+
+    def words(self) -> str:
+        most = "without a limit" if self.max_thrust is None else f"of at most {self.force_limit():g} N"
+        ways = " both ways" if self.both_ways else ""
+        return f"{len(self.directions)} thrusters fixed to the body, {most}{ways}{self._burning_words()}"
+
+
+def _three(name: str, value: Any, unit: str) -> float | tuple:
+    found = limits(name, value, unit)
+    if isinstance(found, tuple) and len(found) != AXES:
+        raise ValueError(f"{name} must be one number or three, one a body axis [{unit}]; got {short(value)}")
+    return found
+
+
+def _rows(name: str, value: Any, unit: str) -> tuple[tuple[float, ...], ...]:
+    rows = tuple(vector(f"{name}[{i}]", row, unit) for i, row in enumerate(entries(value) or ()))
+    if not rows or any(len(row) != AXES for row in rows):
+        raise ValueError(f"Thrusters: {name} must be rows of three numbers [{unit}]; got {short(value)}")
+    return rows
+
+
+def _listed(value: Any) -> str:
+    return f"({', '.join(f'{x:g}' for x in value)})" if isinstance(value, tuple) else f"{value:g}"

@@ -1,0 +1,265 @@
+"""Where a body that turns starts and ends: its attitude and rate, with or without a position and velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import FreeVector, Vector, checked, entries, number, short, vector
+from dmoc.basics.quaternions import rotation_vectors
+from dmoc.scene.ends import Boundary, State
+
+# A quaternion may be longer or shorter than 1 by this part before it is refused [-]: numbers that were written
+# with four digits are made unit quaternions, others are probably no attitudes.
+NEARLY_UNIT = 1e-3
+# A body in space has these many axes.
+AXES = 3
+
+
+def rotation(axis: Vector, degrees: float) -> tuple[float, float, float, float]:
+    """The unit quaternion, scalar first, of a turn about an axis.
+
+    Parameters
+    ----------
+    axis : sequence of float
+        Direction of three entries [-]; made a unit vector.
+    degrees : float
+        Angle of the turn [degrees], right-handed about the axis.
+
+    Raises
+    ------
+    ValueError
+        If the axis is no direction in space.
+    """
+    direction = np.array(vector("axis", axis, "-"))
+    length = float(np.linalg.norm(direction))
+    if len(direction) != AXES or length == 0:
+        raise ValueError(f"axis must be a direction of three numbers [-]; got {short(axis)}")
+    half = np.radians(number("degrees", degrees, "degrees")) / 2
+    x, y, z = np.sin(half) * direction / length
+    return float(np.cos(half)), float(x), float(y), float(z)
+
+
+class Turning(Boundary):
+    """A boundary with an attitude: the fields and methods that `Attitude` and `Pose` share.
+
+    `quaternion` is None where the attitude is free, and `other_way` says that the goal is reached by the turn
+    that goes the other way round.
+    """
+
+    other_way: bool = False
+
+    @property
+    def dimension(self) -> int:
+        return AXES
+
+    @property
+    def turns_body(self) -> bool:
+        return True
+
+    @property
+    def _attitude(self) -> np.ndarray:
+        """Unit quaternion; NaN where it is free."""
+        raise NotImplementedError
+
+    def oriented(self, start: Boundary) -> Turning:
+        """The same goal with the sign of its quaternion that the turn from a start leads to.
+
+        q and -q are one attitude; the shorter way from the start ends at the one with q_start . q >= 0.
+        """
+        known = getattr(start, "_attitude", np.full(4, np.nan))
+        along = float(known @ self._attitude)
+        if np.isnan(along) or (along < 0) == self.other_way:
+            return self
+        return self._opposite()
+
+    def _opposite(self) -> Turning:
+        raise NotImplementedError
+
+    def the_other_way(self) -> Turning:
+        """The same goal, reached the other way round."""
+        return replace(self._opposite(), other_way=not self.other_way)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True)
+class Attitude(Turning):
+    """An attitude and an angular rate alone: the position of the body is left out of the problem.
+
+    Parameters
+    ----------
+    quaternion : sequence of 4 floats or None
+        Unit quaternion from body axes to space axes, scalar first [-]; None frees it. See `rotation`.
+    rate : sequence of float or None
+        Angular rate in body axes [rad/s]. An entry that is None is free; None alone frees all three.
+    other_way : bool
+        Of a goal: reach it by the longer turn from the start, the other way round.
+    """
+
+    quaternion: Vector | None
+    rate: FreeVector = (0.0, 0.0, 0.0)
+    other_way: bool = False
+
+    def __post_init__(self) -> None:
+        checked(self, quaternion=_quaternion(self.quaternion), rate=_rate(self.rate))
+        if self.quaternion is None and all(entry is None for entry in self.rate or ()):
+            raise ValueError("Attitude: quaternion and rate are both None; fix at least one of them [-], [rad/s]")
+
+    @property
+    def has_position(self) -> bool:
+        return False
+
+    @property
+    def _attitude(self) -> np.ndarray:
+        return _known(self.quaternion, 4)
+
+    def _opposite(self) -> Attitude:
+        return replace(self, quaternion=tuple(-x for x in self.quaternion or ()) or None)
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._attitude, np.array(self.rate, float)
+
+    def words(self) -> str:
+        return f"{_attitude_words(self._attitude)}, rate {_listed(self.rate)} rad/s"
+
+
+@dataclass(frozen=True)
+class Pose(Turning):
+    """A position, a velocity, an attitude and an angular rate; entries that are None are free.
+
+    Parameters
+    ----------
+    position, velocity : sequence of float or None
+        Of the centre of mass, in space axes [m], [m/s]; None frees all three entries.
+    attitude : sequence of 4 floats or None
+        Unit quaternion from body axes to space axes, scalar first [-]; None frees it. See `rotation`.
+    rate : sequence of float or None
+        Angular rate in body axes [rad/s].
+    other_way : bool
+        Of a goal: reach its attitude by the longer turn from the start, the other way round.
+    """
+
+    position: FreeVector
+    velocity: FreeVector = (0.0, 0.0, 0.0)
+    attitude: Vector | None = (1.0, 0.0, 0.0, 0.0)
+    rate: FreeVector = (0.0, 0.0, 0.0)
+    other_way: bool = False
+
+    def __post_init__(self) -> None:
+        free = (None,) * AXES
+        position, velocity = (free if part is None else part for part in (self.position, self.velocity))
+        state = State(position, velocity)
+        if state.dimension != AXES:
+            raise ValueError(
+                f"Pose: position must have three entries [m], one an axis of space; got {short(self.position)}"
+            )
+        checked(
+            self,
+            position=state.position,
+            velocity=state.velocity,
+            attitude=_quaternion(self.attitude),
+            rate=_rate(self.rate),
+        )
+
+    @property
+    def _attitude(self) -> np.ndarray:
+        return _known(self.attitude, 4)
+
+    def _opposite(self) -> Pose:
+        return replace(self, attitude=tuple(-x for x in self.attitude or ()) or None)
+
+    @property
+    def point(self) -> State:
+        return State(self.position, self.velocity)
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        position = np.concatenate([np.array(self.position, float), self._attitude])
+        return position, np.concatenate([np.array(self.velocity, float), np.array(self.rate, float)])
+
+    def words(self) -> str:
+        return f"{self.point.words()}, {_attitude_words(self._attitude)}, rate {_listed(self.rate)} rad/s"
+
+
+def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
+    """An inertia in body axes [kg m^2] as a symmetric matrix: from three numbers or a matrix.
+
+    Raises
+    ------
+    ValueError
+        If it is no inertia of a body: not symmetric, not positive, or one principal moment above the sum of
+        the others.
+    """
+    given = entries(value)
+    rows = None if given is None else [entries(row) for row in given]
+    if given is None or len(given) != AXES or rows is None:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    if all(row is None for row in rows):
+        moments = [number(f"inertia[{i}]", x, "kg m^2", positive=True) for i, x in enumerate(given)]
+        matrix = np.diag(moments)
+    elif all(row is not None and len(row) == AXES for row in rows):
+        matrix = np.array(
+            [
+                [number(f"inertia[{i}][{j}]", x, "kg m^2") for j, x in enumerate(row or ())]
+                for i, row in enumerate(rows)
+            ]
+        )
+    else:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    size = np.abs(matrix).max()
+    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
+        raise ValueError(f"inertia must be symmetric [kg m^2]; got {short(value)}")
+    small, middle, large = np.linalg.eigvalsh(matrix)
+    if small <= 0:
+        raise ValueError(f"inertia must have positive principal moments [kg m^2]; the smallest is {small:.3g}")
+    # A flat plate has equality; the rounding of numbers with nine digits is allowed for.
+    if large > (small + middle) * (1 + 1e-9):
+        raise ValueError(
+            f"no body has the principal moments {small:.4g}, {middle:.4g}, {large:.4g} kg m^2: none can be more "
+            "than the sum of the two others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in 0.5 * (matrix + matrix.T))
+
+
+def _quaternion(value: Any) -> tuple[float, ...] | None:
+    """A unit quaternion, or None for a free one."""
+    if value is None:
+        return None
+    parts = entries(value)
+    if parts is None or len(parts) != 4:
+        raise ValueError(
+            "an attitude must be a unit quaternion of 4 numbers, scalar first [-], as rotation(axis, degrees) "
+            f"gives, or None; got {short(value)}"
+        )
+    found = np.array([number(f"quaternion[{i}]", part, "-") for i, part in enumerate(parts)])
+    length = float(np.linalg.norm(found))
+    if abs(length - 1) > NEARLY_UNIT:
+        raise ValueError(
+            f"an attitude must be a unit quaternion [-]; got {short(value)} of length {length:.6g}: divide it by that"
+        )
+    return tuple(float(x) for x in found / length)
+
+
+def _rate(value: Any) -> tuple[float | None, ...]:
+    rate = vector("rate", (None,) * AXES if value is None else value, "rad/s", free=True)
+    if len(rate) != AXES:
+        raise ValueError(f"rate must have three entries in body axes [rad/s]; got {short(value)}")
+    return rate
+
+
+def _known(quaternion: Any, size: int) -> np.ndarray:
+    return np.full(size, np.nan) if quaternion is None else np.array(quaternion, float)
+
+
+def _attitude_words(attitude: np.ndarray) -> str:
+    if np.isnan(attitude).any():
+        return "any attitude"
+    vector = rotation_vectors(attitude)
+    angle = float(np.linalg.norm(vector))
+    if angle == 0:
+        return "attitude as the space axes"
+    return f"turned by {np.degrees(angle):.6g} degrees about {_listed(np.round(vector / angle, 6))}"
+
+
+def _listed(values: Any) -> str:
+    return "(" + ", ".join("free" if value is None else f"{value:g}" for value in values) + ")"
