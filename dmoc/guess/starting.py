@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import short
-from dmoc.basics.quaternions import slerp
 from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
-from dmoc.guess.turning import as_point, checked_turning, joined, turning_duration, turning_states
+from dmoc.guess.turning import as_point, attitudes_along, checked_turning, joined, turning_duration, turning_states
 from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -97,7 +96,7 @@ def _turning_guess(
         likely = max(likely if problem.actuator.turning_limit() else 0.0, guess_duration(point))
     duration = duration or likely
     control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
-    q0, w0, q1, w1 = turning_states(problem, duration)
+    _, w0, _, w1 = turning_states(problem, duration)
     if given is not None:
         position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
         place = None
@@ -106,7 +105,7 @@ def _turning_guess(
             linear = starting_guess(point, mesh, order, hold, None, duration)
             ends = (np.append(linear.start_velocity, w0), np.append(linear.goal_velocity, w1))
     else:
-        position = slerp(q0, q1, fractions)
+        position = attitudes_along(problem, duration, fractions)
         ends = (w0, w1)
         place = None if point is None else starting_guess(point, mesh, order, hold, None, duration)
     return joined(problem, place, (mesh, order, hold, duration, position, ends, control))

@@ -1,0 +1,248 @@
+"""Effects on a body that turns: gravity gradient, a pivot under gravity, drag and radiation on flat plates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import Vector, checked, entries, number, short, vector
+from dmoc.effects.base import Attractor, Body, BodyConservative, BodyForce
+
+# The speed of light [m/s], exact by definition.
+LIGHT = 299_792_458.0
+# A plate counts as lit over this part of its area at grazing incidence [-]: the rounding of the corner there.
+GRAZING = 1e-2
+
+
+@dataclass(frozen=True)
+class GravityGradient(BodyConservative):
+    """Torque of a point mass on a body that is not round: V = -mu tr(J)/(2 r^3) + 3 mu r.J r/(2 r^5).
+
+    The attraction of the centre of mass is not in it: list `PointGravity`, too. For an attitude alone, give the
+    place of the body.
+
+    Parameters
+    ----------
+    mu : float
+        Gravitational parameter [m^3/s^2].
+    center : sequence of float, optional
+        Place of the point mass [m]; the origin if not given.
+    place : function of the time, or sequence of float, optional
+        Where the body is [m], where the problem is its attitude alone.
+
+    References
+    ----------
+    P. C. Hughes, Spacecraft Attitude Dynamics (1986), section 8.1.
+    """
+
+    mu: float
+    center: Vector = (0.0, 0.0, 0.0)
+    place: Callable | Vector | None = None
+
+    def __post_init__(self) -> None:
+        checked(
+            self,
+            mu=number("mu", self.mu, "m^3/s^2", positive=True),
+            center=vector("center", self.center, "m"),
+        )
+        if self.place is not None and not callable(self.place):
+            checked(self, place=vector("place", self.place, "m"))
+
+    def attractor(self) -> Attractor | None:
+        return None
+
+    @property
+    def moves_body(self) -> bool:
+        return self.place is None
+
+    def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
+        if self.place is None:
+            position = body.position
+        else:
+            position = self.place(t) if callable(self.place) else ca.DM(self.place)
+        offset = position - ca.DM(self.center)
+        radius = ca.sqrt(ca.dot(offset, offset))
+        inertia = ca.DM(np.asarray(body.inertia))
+        seen = body.rotation.T @ offset
+        pull = np.trace(np.asarray(body.inertia)) / (2 * radius**3) - 3 * ca.dot(seen, inertia @ seen) / (
+            2 * radius**5
+        )
+        return self.mu * pull / m
+
+
+@dataclass(frozen=True)
+class PivotGravity(BodyConservative):
+    """Uniform gravity on a body that is held at a fixed point: the heavy top.
+
+    The problem is the attitude alone, and its inertia is that about the pivot.
+
+    Parameters
+    ----------
+    acceleration : sequence of float
+        Acceleration of gravity in space axes [m/s^2].
+    arm : sequence of float
+        Centre of mass from the pivot, in body axes [m].
+    """
+
+    acceleration: Vector
+    arm: Vector
+
+    def __post_init__(self) -> None:
+        checked(
+            self,
+            acceleration=_three("acceleration", self.acceleration, "m/s^2"),
+            arm=_three("arm", self.arm, "m"),
+        )
+
+    @property
+    def moves_body(self) -> bool:
+        return False
+
+    def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
+        return ca.dot(ca.DM(self.acceleration), body.rotation @ ca.DM(self.arm))
+
+
+@dataclass(frozen=True)
+class Plates:
+    """The outside of a body as flat plates: areas, outward normals, and offsets of their centres.
+
+    Parameters
+    ----------
+    areas : sequence of float
+        [m^2]
+    normals : sequence of sequences
+        Outward, in body axes [-]; made unit vectors.
+    offsets : sequence of sequences
+        Centre of each plate from the centre of mass, in body axes [m].
+    """
+
+    areas: Sequence[float]
+    normals: Sequence[Vector]
+    offsets: Sequence[Vector]
+
+    def __post_init__(self) -> None:
+        areas = tuple(
+            number(f"areas[{i}]", x, "m^2", positive=True) for i, x in enumerate(entries(self.areas) or ())
+        )
+        normals = tuple(_three(f"normals[{i}]", x, "-") for i, x in enumerate(entries(self.normals) or ()))
+        offsets = tuple(_three(f"offsets[{i}]", x, "m") for i, x in enumerate(entries(self.offsets) or ()))
+        if not areas or not len(areas) == len(normals) == len(offsets):
+            raise ValueError(
+                f"Plates: give one area, normal and offset each; got {len(areas)}, {len(normals)}, {len(offsets)}"
+            )
+        if not all(np.linalg.norm(normal) > 0 for normal in normals):
+            raise ValueError(f"Plates: normals must not be zero; got {short(self.normals)}")
+        units = tuple(tuple(float(x) for x in np.array(n) / np.linalg.norm(n)) for n in normals)
+        checked(self, areas=areas, normals=units, offsets=offsets)
+
+    def wrench(self, rotation: Any, toward: Any, push: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
+        """Force in space axes and torque in body axes of all plates that face a direction.
+
+        `toward` is the unit vector in body axes from the body to where it is pushed from, and `push` gives
+        the force per area in body axes from the cosine of incidence, 0 for a plate that turns away, and the
+        normal.
+        """
+        force, torque = ca.SX.zeros(3), ca.SX.zeros(3)
+        for area, normal, offset in zip(self.areas, self.normals, self.offsets, strict=True):
+            cosine = ca.dot(ca.DM(normal), toward)
+            # max(cosine, 0) with its corner rounded.
+            facing = 0.5 * (cosine + ca.sqrt(cosine**2 + GRAZING**2))
+            part = area * push(facing, ca.DM(normal))
+            force, torque = force + part, torque + ca.cross(ca.DM(offset), part)
+        return rotation @ force, torque
+
+
+@dataclass(frozen=True)
+class PlateDrag(BodyForce):
+    """Drag of free molecules on flat plates: rho |v|^2 A cos(incidence) against the motion, times a coefficient.
+
+    Parameters
+    ----------
+    plates : Plates
+    density : float or function of (t, q)
+        Density of the atmosphere [kg/m^3].
+    coefficient : float
+        Half of the usual drag coefficient [-].
+    """
+
+    plates: Plates
+    density: float | Callable
+    coefficient: float = 1.1
+
+    def __post_init__(self) -> None:
+        _check_plates(self.plates)
+        if not callable(self.density):
+            checked(self, density=number("density", self.density, "kg/m^3", positive=True))
+        checked(self, coefficient=number("coefficient", self.coefficient, "-", positive=True))
+
+    def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        speed = ca.sqrt(ca.dot(body.velocity, body.velocity) + 1e-16)
+        ahead = body.rotation.T @ body.velocity / speed
+        density = self.density(t, body.position) if callable(self.density) else self.density
+        pressure = self.coefficient * density * speed**2
+        return self.plates.wrench(body.rotation, ahead, lambda facing, normal: -pressure * facing * ahead)
+
+
+@dataclass(frozen=True)
+class PlateRadiation(BodyForce):
+    """Radiation pressure on flat plates that reflect a part of the light like mirrors.
+
+    A plate of reflectivity rho is pushed by P A cos(i) [(1 - rho) s + 2 rho cos(i) n] away from the light.
+
+    Parameters
+    ----------
+    plates : Plates
+    direction : sequence of float
+        Direction to the light, in space axes [-]; made a unit vector.
+    flux : float
+        Power of the light [W/m^2]; 1361 is that of the Sun at 1 AU.
+    reflectivity : float
+        0 absorbs all, 1 reflects all [-].
+    """
+
+    plates: Plates
+    direction: Vector
+    flux: float = 1361.0
+    reflectivity: float = 0.3
+
+    def __post_init__(self) -> None:
+        _check_plates(self.plates)
+        direction = np.array(_three("direction", self.direction, "-"))
+        if not direction.any():
+            raise ValueError("PlateRadiation: direction must not be zero [-]")
+        checked(
+            self,
+            direction=tuple(float(x) for x in direction / np.linalg.norm(direction)),
+            flux=number("flux", self.flux, "W/m^2", positive=True),
+            reflectivity=number("reflectivity", self.reflectivity, "-", nonnegative=True),
+        )
+        if self.reflectivity > 1:
+            raise ValueError(f"PlateRadiation: reflectivity must be 0 to 1 [-]; got {self.reflectivity:g}")
+
+    @property
+    def moves_body(self) -> bool:
+        return False
+
+    def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
+        toward, mirror = body.rotation.T @ ca.DM(self.direction), self.reflectivity
+
+        def push(facing: Any, normal: Any) -> Any:
+            return -self.flux / LIGHT * facing * ((1 - mirror) * toward + 2 * mirror * facing * normal)
+
+        return self.plates.wrench(body.rotation, toward, push)
+
+
+def _check_plates(plates: Any) -> None:
+    if not isinstance(plates, Plates):
+        raise ValueError(f"plates must be dmoc.Plates(areas, normals, offsets); got {short(plates)}")
+
+
+def _three(name: str, value: Any, unit: str) -> tuple[float, ...]:
+    found = vector(name, value, unit)
+    if len(found) != 3:
+        raise ValueError(f"{name} must have three entries [{unit}]; got {short(value)}")
+    return found
