@@ -22,13 +22,21 @@ if TYPE_CHECKING:
     from dmoc.effects import Atmosphere as Atmosphere
     from dmoc.effects import ClohessyWiltshire as ClohessyWiltshire
     from dmoc.effects import ConicalShadow as ConicalShadow
+    from dmoc.effects import Body as Body
+    from dmoc.effects import BodyConservative as BodyConservative
+    from dmoc.effects import BodyForce as BodyForce
     from dmoc.effects import Conservative as Conservative
     from dmoc.effects import CylindricalShadow as CylindricalShadow
     from dmoc.effects import Drag as Drag
     from dmoc.effects import Effect as Effect
     from dmoc.effects import ExponentialAtmosphere as ExponentialAtmosphere
     from dmoc.effects import Force as Force
+    from dmoc.effects import GravityGradient as GravityGradient
     from dmoc.effects import LinearDrag as LinearDrag
+    from dmoc.effects import PivotGravity as PivotGravity
+    from dmoc.effects import PlateDrag as PlateDrag
+    from dmoc.effects import PlateRadiation as PlateRadiation
+    from dmoc.effects import Plates as Plates
     from dmoc.effects import PointGravity as PointGravity
     from dmoc.effects import RadiationPressure as RadiationPressure
     from dmoc.effects import RotatingFrame as RotatingFrame
@@ -62,6 +70,9 @@ if TYPE_CHECKING:
     from dmoc.parts.objectives import Objective as Objective
     from dmoc.parts.objectives import Time as Time
     from dmoc.parts.objectives import WeightedSum as WeightedSum
+    from dmoc.parts.pointing import PointingKeepIn as PointingKeepIn
+    from dmoc.parts.pointing import PointingKeepOut as PointingKeepOut
+    from dmoc.parts.pointing import RateLimit as RateLimit
     from dmoc.parts.rows import Row as Row
     from dmoc.parts.speed import SpeedLimit as SpeedLimit
     from dmoc.parts.turning import Thrusters as Thrusters

@@ -13,7 +13,8 @@ from dmoc.checks.evidence import Evidence
 from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.flown import BREAKS
-from dmoc.results.between import BOUND, cuts
+from dmoc.motion.momenta import rates_along
+from dmoc.results.between import BOUND, cuts, turn_cuts
 
 # A boundary entry that is fixed may be off by this part of the extent or speed [-]: it is a bound, not a row,
 # so only round-off moves it.
@@ -108,6 +109,10 @@ def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     scales = evidence.extent, evidence.speed
     for cut in cuts(evidence.problem.constraints, evidence.path, evidence.node_velocity, *scales):
         yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
+    if evidence.path.attitudes:
+        rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)[:, ~evidence.speeds]
+        for cut in turn_cuts(evidence.problem.constraints, evidence.path, evidence.begin, rates):
+            yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
 
 
 def _most(values: Any) -> float:

@@ -8,7 +8,8 @@ from dmoc.effects.atmosphere import (
     UniformAtmosphere,
     Wind,
 )
-from dmoc.effects.base import Conservative, Effect, Force
+from dmoc.effects.base import Body, BodyConservative, BodyForce, Conservative, Effect, Force
+from dmoc.effects.bodies import GravityGradient, PivotGravity, PlateDrag, PlateRadiation, Plates
 from dmoc.effects.frames import ClohessyWiltshire, RotatingFrame, three_body
 from dmoc.effects.gravity import J2, PointGravity, Spring, UniformGravity
 from dmoc.effects.motion import circular_motion, kepler_motion, tabulated_motion
@@ -18,6 +19,9 @@ from dmoc.effects.third_body import ThirdBody
 __all__ = [
     "J2",
     "Atmosphere",
+    "Body",
+    "BodyConservative",
+    "BodyForce",
     "ClohessyWiltshire",
     "ConicalShadow",
     "Conservative",
@@ -26,7 +30,12 @@ __all__ = [
     "Effect",
     "ExponentialAtmosphere",
     "Force",
+    "GravityGradient",
     "LinearDrag",
+    "PivotGravity",
+    "PlateDrag",
+    "PlateRadiation",
+    "Plates",
     "PointGravity",
     "RadiationPressure",
     "RotatingFrame",

@@ -67,7 +67,7 @@ def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
-    zones = [type(constraint) for constraint in problem.constraints]
+    zones = [(type(constraint), getattr(constraint, "structure", None)) for constraint in problem.constraints]
     shape = configuration_of(problem), problem.free_duration, order, hold
     make = partial(_written, problem, scheme(order), hold)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)

@@ -98,6 +98,10 @@ class Constraint(ABC):
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """By how much states of shape (count, dimension) break the limit, in `unit`; 0 where it holds."""
 
+    def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The same at times of shape (count,), for a limit that moves; `excess` by default."""
+        return self.excess(q, v)
+
     @abstractmethod
     def words(self) -> str:
         """One line for a person: what the body does to keep it, as in "stays below 3 m"."""
@@ -134,6 +138,10 @@ class Constraint(ABC):
     def feature(self) -> float:
         """Size of the smallest thing that a path must not step over [m]; infinite if there is none."""
         return np.inf
+
+    def feature_angle(self) -> float:
+        """Half angle of the cone that a limit on the attitude keeps to [degrees]."""
+        return 90.0
 
     def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
         """A path, shape (nodes, dimension) [m], moved off places from which all ways round are equally long."""

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmoc.motion.configuration import places_in
+from dmoc.basics.quaternions import normalised
+from dmoc.motion.configuration import QUATERNION, places_in
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.constraint import Constraint
 
@@ -96,6 +98,51 @@ def cuts(
         allowed = BOUND * extent + min(depth + bend, DEEPEST * min(size, extent))
         between = constraint.excess(inside, still)
         yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, _steps(path, between > allowed))
+
+
+def turn_cuts(
+    constraints: Sequence[Constraint], path: DiscretePath, start_time: float, rates: np.ndarray
+) -> Iterator[Cut]:
+    """Limits on attitude and rate of a body, at the nodes and between them.
+
+    Rows for cones act at nodes alone, so between two of them an axis may cut into a cone: by d^2 / 8 over the
+    tangent of the cone's angle for nodes a turn d apart, and by no more than a hundredth of the angle.
+
+    Parameters
+    ----------
+    constraints : sequence of Constraint
+    path : DiscretePath
+    start_time : float
+        [s].
+    rates : array, shape (nodes, 3)
+        Rate in body axes at every node [rad/s].
+    """
+    ours = [(i, constraint) for i, constraint in enumerate(constraints) if constraint.turns_body]
+    if not ours:
+        return
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    attitude, at = path.attitudes[0], step_nodes(steps, rule)
+    inner = rule.values_at(np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1])
+    inside = normalised(np.einsum("pj,jkn->kpn", inner, attitude[at])).reshape(-1, QUATERNION)
+    h = np.diff(path.mesh)[:, None]
+    fractions = (path.mesh[:-1, None] + h * np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]).ravel()
+    times = start_time + path.duration * np.array(path.fractions)
+    turned, none = path.largest_turn, np.empty(0, int)
+    sway = 0.5 * _bump(path, rates)
+    for i, constraint in ours:
+        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
+        at_nodes = _most(constraint.excess_at(times, attitude, rates))
+        if constraint.limits_speed:
+            limit = constraint.largest_speed() or 0.0
+            yield Cut(name, i, at_nodes, BOUND * limit + min(sway, DEEPEST * limit), unit, none)
+            continue
+        yield Cut(f"{name} at nodes", i, at_nodes, np.degrees(BOUND), unit, none)
+        angle = np.radians(constraint.feature_angle())
+        depth = turned**2 / (8 * np.tan(min(angle, np.pi - angle)) or 1.0)
+        allowed = float(np.degrees(BOUND + min(depth, DEEPEST * angle)))
+        between = constraint.excess_at(start_time + path.duration * fractions, inside, np.zeros((len(inside), 3)))
+        broken = np.flatnonzero(between.reshape(steps, -1).max(axis=1) > allowed)
+        yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, broken)
 
 
 def _steps(path: DiscretePath, broken: np.ndarray) -> np.ndarray:

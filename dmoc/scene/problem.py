@@ -225,13 +225,17 @@ class TransferProblem:
                 if np.isnan(known).any():
                     continue
                 # A state on the limit itself may lie beyond it by the rounding of its own numbers.
-                excess = float(constraint.excess(*state)[0])
+                excess = float(constraint.excess_at(np.array([self._time_of(end)]), *state)[0])
                 if excess > 1e-9 * (np.abs(known).max() or 1.0):
                     name = f"{type(constraint).__name__} (constraint {i + 1})"
                     raise ValueError(
                         f"{end} breaks {name} by {excess:.3g} {constraint.unit}: "
                         f"the body {constraint.words()}; move the {end} or the constraint"
                     )
+
+    def _time_of(self, end: str) -> float:
+        """The time of an end [s]; of the goal of a free duration the earliest."""
+        return self.start_time + (self.duration_bounds[0] if end == "goal" else 0.0)
 
     def _check_objective(self) -> None:
         sought = [type(term) for weight, term in self.objective.terms if weight]
