@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,17 @@ def turning_duration(problem: TransferProblem) -> float:
     angle = float(angle_between(q0, q1))
     needed = 2 * np.sqrt(angle / acceleration) + float(np.linalg.norm(w1 - w0)) / acceleration
     return float(np.clip(LEISURE * needed, shortest, longest)) if needed > 0 else middle
+
+
+def followed(problem: TransferProblem, given: Any) -> TransferProblem:
+    """The problem whose goal has the sign of its quaternion to which a former path leads: the way round of it."""
+    path = getattr(given, "path", given)
+    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
+        return problem
+    ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
+    signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
+    # NaN, where an end leaves its attitude open, is not less than 0.
+    return replace(problem, goal=problem.goal.the_other_way()) if signs[0] * signs[1] < 0 else problem
 
 
 def as_point(problem: TransferProblem) -> TransferProblem:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmoc.basics.quaternions import angle_between
+from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import step_matrices
@@ -24,6 +26,11 @@ NEGLIGIBLE = 0.1
 LOOKED_AT = 200
 # A step whose h omega is below this is stable by far at any order: nothing is computed before the solve.
 HARMLESS = 0.5
+
+
+# A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its own
+# that are off by degrees, and Ipopt finds them.
+TURN_A_STEP = {2: np.radians(30), 4: np.radians(90), 6: np.radians(90), 8: np.radians(90)}
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,34 @@ def flow_matrices(
     return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
 
 
+def steps_to_turn(path: DiscretePath) -> int:
+    """So many equal steps follow the turns of a path: none turns a body by more than its order allows."""
+    h = path.duration * np.diff(path.mesh)
+    spins = np.array([path.start_velocity, path.goal_velocity])[:, ~speeds_in(path.parts)]
+    most = np.zeros(len(h))
+    for q in path.attitudes:
+        turned = angle_between(q[1:], q[:-1]).reshape(len(h), -1).sum(axis=1)
+        most = np.maximum(most, np.maximum(turned, h * np.linalg.norm(spins, axis=1).max()))
+    return int(np.ceil((most / h).max() * path.duration / TURN_A_STEP[path.order]))
+
+
+def _refuse_large_turns(guess: DiscretePath) -> None:
+    """Refuse a mesh whose steps turn a body too far.
+
+    Raises
+    ------
+    ValueError
+        With the number of steps that is enough.
+    """
+    steps = len(guess.mesh) - 1
+    if guess.attitudes and (enough := steps_to_turn(guess)) > steps:
+        angle = np.degrees(TURN_A_STEP[guess.order]) * enough / steps
+        raise ValueError(
+            f"{steps} steps of order {guess.order} turn the body by up to {angle:.3g} degrees each, and no more "
+            f"than {np.degrees(TURN_A_STEP[guess.order]):.0f} degrees are followed; use at least {enough} steps"
+        )
+
+
 def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, shortest: float) -> None:
     """Refuse a mesh beyond the scheme's stability limit where that is known before the solve.
 
@@ -97,6 +132,7 @@ def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, 
     ValueError
         With h omega, the growth per step and the number of steps that is enough.
     """
+    _refuse_large_turns(guess)
     longest = np.diff(guess.mesh).max()
     order, degree = guess.order, guess.order // 2
     nodes = np.linspace(0, len(guess.position) - 1, 2 * degree + 1).round().astype(int)

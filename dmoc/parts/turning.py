@@ -83,6 +83,10 @@ class Torque(_OnBody):
     def limit_words(self) -> str:
         return "torque limit"
 
+    @property
+    def limit_unit(self) -> str:
+        return "N m"
+
     def needs(self, eased: Actuator) -> str:
         enough = up(eased.torque_limit() or 0.0)
         return f"a torque limit of {enough} N m (you gave {self.torque_limit():g} N m)"

@@ -12,7 +12,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.stability import flow_matrices
+from dmoc.motion.stability import TURN_A_STEP, flow_matrices, steps_to_turn
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
 
@@ -78,6 +78,8 @@ def first_path(
     first = guess_on(problem, ends, order or 2, hold, guess)
     if mesh is not None:
         return first
+    if steps is None and (enough := steps_to_turn(first)) > len(first.mesh) - 1:
+        return starting_guess(problem, check_mesh(enough), first.order, hold, guess)
     turns = angle_around(problem, first) / (2 * np.pi)
     if steps is None and turns > MANY_TURNS:
         order = order or (2 if hold else ORDER_OF_MANY_TURNS)
@@ -99,7 +101,7 @@ def trial_path(
         return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
 
     first = on(steps or TRIAL_STEPS)
-    enough = 2 * least_steps(problem, first)
+    enough = max(2 * least_steps(problem, first), steps_to_turn(first))
     return on(enough) if steps is None and enough > TRIAL_STEPS else first
 
 
@@ -146,7 +148,8 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
         turns = angle_around(problem, first) / (2 * np.pi)
         a_turn = order // 2 * COARSE_TURN[order] if order > 2 and turns > VERY_MANY_TURNS else 0
         in_phase = IN_PHASE * turns**1.5 if order == 2 else a_turn * turns
-        least = max(least, order // 2 * least_steps(problem, first), int(in_phase))
+        turned = order // 2 * int(steps_to_turn(first) * TURN_A_STEP[first.order] / TURN_A_STEP[order])
+        least = max(least, order // 2 * least_steps(problem, first), int(in_phase), turned)
     while counts[-1] > 2 * least:
         counts.append(max(least, -(-counts[-1] // FINER[limited])) if order == first.order else least)
     places = np.linspace(0.0, 1.0, len(final))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.guess.turning import followed
 from dmoc.motion.lobatto import scheme
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
@@ -84,6 +85,7 @@ def solve(
         raise ValueError(f"progress must be a function; got {short(progress)}")
     if time_limit is not None:
         number("time_limit", time_limit, "s", positive=True)
+    problem = followed(problem, problem.guess if guess is None else guess)
     ladder = Ladder(problem, options, progress, compiled, time_limit)
     if tol is not None:
         if mesh is not None:

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.quaternions import times, turned_by
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.path import DiscretePath
+from dmoc.guess.turning import followed
+from dmoc.motion.configuration import places_in, quaternions_in
+from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
@@ -50,9 +53,9 @@ def local_optima(
 ) -> list[Optimum]:
     """The distinct optima that `starts` guesses lead to, the best first.
 
-    The guesses are the default one, then with a lone attractor more and fewer revolutions, with
-    keep-out zones paths that bend around each on either side, then random bends. The same numbers
-    are drawn every time.
+    The guesses are the default one, then for a body that turns the turn the other way round, with a lone
+    attractor more and fewer revolutions, with keep-out zones paths that bend around each on either side, then
+    random bends. The same numbers are drawn every time.
     """
     base = first_path(problem, order, None, hold, guess)
     if order or base.order == 2:
@@ -60,7 +63,7 @@ def local_optima(
         base = starting_guess(problem, check_mesh(steps), base.order, hold, guess)
     found: list[Optimum] = []
     for _, (name, start) in zip(range(starts), _variants(problem, base), strict=False):
-        ladder = Ladder(problem)
+        ladder = Ladder(followed(problem, start))
         with ladder.interrupt:
             rung = ladder.climb_to(start, start)
         if rung.stopped:
@@ -72,10 +75,11 @@ def local_optima(
 
 def _add(found: list[Optimum], new: Optimum) -> None:
     """Add the start of an optimum to an equal one that was found before, or else the optimum to the list."""
-    extent = np.ptp(new.path.position, axis=0).max() or 1.0
+    scales = path_scales(new.path).coordinates
     for i, old in enumerate(found):
         near = abs(new.objective - old.objective) <= SAME_OBJECTIVE * abs(old.objective)
-        if near and np.abs(new.path.position - old.path.position).max() < SAME_PATH * extent:
+        apart = np.abs(new.path.position - old.path.position).max(axis=0)
+        if near and (apart < SAME_PATH * scales).all():
             found[i] = replace(old, starts=old.starts + new.starts)
             return
     found.append(new)
@@ -84,6 +88,9 @@ def _add(found: list[Optimum], new: Optimum) -> None:
 def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
     """Names and guesses, without end."""
     yield "default", base
+    if problem.inertia is not None:
+        yield from _turns(problem, base)
+        return
     lone = problem.attraction.lone
     if lone is not None and problem.dimension > 1:
         center = lone.place(problem.dimension)
@@ -103,6 +110,28 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
         waves = np.sin(np.pi * np.outer(base.fractions, [1, 2]))
         bend = waves @ draw.normal(size=(2, problem.dimension)) * 0.25 * extent
         yield f"bend {number}", replace(base, position=base.position + bend)
+
+
+def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
+    """Names and guesses of a body that turns, without end: the other way round, then bends of both its turns."""
+    ways = [("", base)]
+    if not np.isnan(problem.goal.fixed()[0][-4:]).any():
+        other = replace(problem, goal=problem.goal.the_other_way())
+        ways.append(("the other way round", starting_guess(other, base.mesh, base.order, base.hold)))
+        yield ways[1]
+    draw = np.random.default_rng(0)
+    number = 0
+    places = places_in(base.parts)
+    while True:
+        number += 1
+        name, path = ways[number % len(ways)]
+        waves = np.sin(np.pi * np.outer(path.fractions, [1, 2]))
+        position = path.position.copy()
+        position[:, places] += waves @ draw.normal(size=(2, int(places.sum()))) * 0.25 * path.diagonal
+        # Bends of a radian or so: a turn may go about another axis than the shortest one.
+        for at in quaternions_in(path.parts):
+            position[:, at] = times(position[:, at], turned_by(waves @ draw.normal(size=(2, 3))))
+        yield f"bend {number}" + (f" of {name}" if name else ""), replace(path, position=position)
 
 
 def _turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:

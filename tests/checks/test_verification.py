@@ -60,7 +60,7 @@ def with_path(solution, **changes):
     dynamics = Dynamics.of(problem)
     momentum, velocity = end_momenta(dynamics, path, problem.start_time)
     return replace(
-        solution, path=path, momentum=momentum, velocity=velocity, force=force_of(dynamics, path.control)
+        solution, path=path, momentum=momentum, velocity=velocity, force=force_of(dynamics, path)
     )
 
 

@@ -98,7 +98,7 @@ def test_a_drone_flies_upwind_slower_than_downwind():
 
 @pytest.mark.parametrize("effect", [*IN_SPACE.values(), *OTHERS], ids=lambda effect: type(effect).__name__)
 def test_only_effects_of_the_velocity_look_at_it(effect):
-    resting, moving = split_effects((effect,), 3)
+    resting, moving = split_effects((effect,), Translation(3))
     sees_velocity = isinstance(effect, (Drag, LinearDrag, RotatingFrame, ClohessyWiltshire))
     assert (moving if sees_velocity else resting) == (effect,)
 
