@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
@@ -53,7 +55,10 @@ def accuracy_words(solution: Solution, report: Report) -> str:
     share = accuracy(solution, report)
     if share is None or not math.isfinite(share):
         return ""
-    words = f" The path is right to about {share:.0e} of its extent, {share * solution.path.diagonal:.1e} m"
+    path = solution.path
+    sizes = [f"{share * path.diagonal:.1e} m"] if path.place.size else []
+    sizes += [f"{np.degrees(share * path.turn):.1e} degrees"] if path.attitudes else []
+    words = f" The path is right to about {share:.0e} of its extent, {' and '.join(sizes)}"
     if solution.tolerance is None and share > ACCURATE:
         words += f"; --tol {10 ** math.floor(math.log10(share / BETTER)):.0e} for better"
     return words + "."

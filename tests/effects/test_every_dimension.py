@@ -6,9 +6,9 @@ import pytest
 
 import dmoc
 from dmoc import (
-    Conservative,
     J2,
     ClohessyWiltshire,
+    Conservative,
     Drag,
     Force,
     FreeForce,
