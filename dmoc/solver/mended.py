@@ -147,6 +147,11 @@ def _noted(rung: Rung, note: str) -> Rung:
     return replace(rung, notes=(*rung.notes, note))
 
 
+def is_flyable(ladder: Ladder, rung: Rung) -> bool:
+    """Whether an answer is near one on a finer mesh: it cuts no zone, and hardly misses the goal."""
+    return not _cuts(ladder, rung) and goal_missed(ladder, rung.path) <= NEAR
+
+
 def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
     """By how much an independent integrator misses the goal, over the extent and speed of the path [-].
 
