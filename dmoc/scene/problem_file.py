@@ -20,7 +20,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.docstrings import documented, first_line
-from dmoc.basics.files import as_path
 from dmoc.basics.plain import unbroken
 
 if TYPE_CHECKING:
@@ -124,6 +123,8 @@ def find(name: str) -> Path:
         If there is none.
     """
     if name.endswith(".py") or "/" in name:
+        from dmoc.basics.files import as_path
+
         path = as_path(name)
         if not path.is_file():
             raise ValueError(f"there is no problem file {name}; give a path to a .py file or a name")

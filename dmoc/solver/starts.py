@@ -99,7 +99,7 @@ def compared(ladder: Ladder, solution: Solution, hold: bool) -> Solution:
     if engine.smoothing is not None:
         problem = replace(problem, actuator=replace(engine, smoothing=max(WIDEST_ROUNDING, engine.smoothing)))
     start = starting_guess(problem, meshes[0], order, hold)
-    rung = ladder.ask(problem, start, "the guess compared with the program's own", MOST_COMPARING)
+    rung = ladder.ask(problem, start, "the program's own guess", MOST_COMPARING)
     solution = replace(solution, ladder=(*solution.ladder, rung.level))
     given, own = solution.objective, rung.level.objective
     if (
