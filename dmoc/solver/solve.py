@@ -51,7 +51,7 @@ def solve(
     guess
         Overrides the problem's own guess: function of time, (times, positions), (times, positions, controls),
         a DiscretePath or a Solution. If the answer costs far more than what the program's own guess leads to
-        on a coarse mesh, a warning says so; a DiscretePath is not compared.
+        on a coarse mesh, a warning says so; a DiscretePath or a Solution of this process is not compared.
     options : dict
         CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
     progress : callable
@@ -95,8 +95,10 @@ def solve(
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
         solution = _solved(ladder, order, steps, tol, hold, mesh, guess)
-        # a path goes on from a former answer, as the points of a sweep do
-        return solution if own is None or isinstance(own, DiscretePath) else compared(ladder, solution, hold)
+        # To solve again from the program's own guess would take longer than the warm start from an answer of
+        # this process; of one from a file nobody knows what it answers.
+        former = own is None or isinstance(own, DiscretePath) or getattr(own, "problem", None) is not None
+        return solution if former else compared(ladder, solution, hold)
 
 
 def _solved(
