@@ -14,17 +14,23 @@ __version__ = "0.1.0"
 # The one list of public names, for type checkers and editors as for Python. Python itself imports a name
 # on its first use only, so that `dmoc --help` answers before CasADi is loaded.
 if TYPE_CHECKING:
+    from dmoc.bodies.pointing import PointingKeepIn as PointingKeepIn
+    from dmoc.bodies.pointing import PointingKeepOut as PointingKeepOut
+    from dmoc.bodies.pointing import RateLimit as RateLimit
+    from dmoc.bodies.thrusters import Thrusters as Thrusters
+    from dmoc.bodies.torques import Torque as Torque
+    from dmoc.bodies.torques import Wrench as Wrench
     from dmoc.checks.evidence import Evidence as Evidence
     from dmoc.checks.verification import Check as Check
     from dmoc.checks.verification import Report as Report
     from dmoc.checks.verification import verify as verify
     from dmoc.effects import J2 as J2
     from dmoc.effects import Atmosphere as Atmosphere
-    from dmoc.effects import ClohessyWiltshire as ClohessyWiltshire
-    from dmoc.effects import ConicalShadow as ConicalShadow
     from dmoc.effects import Body as Body
     from dmoc.effects import BodyConservative as BodyConservative
     from dmoc.effects import BodyForce as BodyForce
+    from dmoc.effects import ClohessyWiltshire as ClohessyWiltshire
+    from dmoc.effects import ConicalShadow as ConicalShadow
     from dmoc.effects import Conservative as Conservative
     from dmoc.effects import CylindricalShadow as CylindricalShadow
     from dmoc.effects import Drag as Drag
@@ -70,22 +76,16 @@ if TYPE_CHECKING:
     from dmoc.parts.objectives import Objective as Objective
     from dmoc.parts.objectives import Time as Time
     from dmoc.parts.objectives import WeightedSum as WeightedSum
-    from dmoc.parts.pointing import PointingKeepIn as PointingKeepIn
-    from dmoc.parts.pointing import PointingKeepOut as PointingKeepOut
-    from dmoc.parts.pointing import RateLimit as RateLimit
     from dmoc.parts.rows import Row as Row
     from dmoc.parts.speed import SpeedLimit as SpeedLimit
-    from dmoc.parts.turning import Thrusters as Thrusters
-    from dmoc.parts.turning import Torque as Torque
-    from dmoc.parts.turning import Wrench as Wrench
     from dmoc.parts.zones import ApproachCone as ApproachCone
     from dmoc.parts.zones import KeepIn as KeepIn
     from dmoc.parts.zones import KeepOut as KeepOut
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.results.solution import load as load
+    from dmoc.scene.conditions import Condition as Condition
     from dmoc.scene.ends import Boundary as Boundary
-    from dmoc.scene.ends import Condition as Condition
     from dmoc.scene.ends import Moving as Moving
     from dmoc.scene.ends import State as State
     from dmoc.scene.orbits import CircularOrbit as CircularOrbit

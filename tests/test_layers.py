@@ -16,6 +16,7 @@ LAYERS = [
     ["basics"],
     ["effects"],
     ["parts"],
+    ["bodies"],
     ["scene"],
     ["motion"],
     ["guess", "results"],

@@ -67,7 +67,12 @@ class Evidence:
     def misreported(self) -> float:
         """How far velocity, momentum and force of the solution are off those of its path [-]."""
         true = reported(self.path, self.velocity, self.momentum, self.wrench)
-        floors = {"velocity": self.speed, "rate": self.rate, "force": self.largest, "torque": self.largest_torque}
+        floors = {
+            "velocity": self.speed,
+            "rate": self.rate,
+            "force": self.largest,
+            "torque": self.largest_torque,
+        }
         gaps = []
         for name, values in true.items():
             told = getattr(self.solution, name)
@@ -85,7 +90,9 @@ class Evidence:
     @cached_property
     def node_velocity(self) -> np.ndarray:
         """dq/dt at every node: from the momenta at the step ends, of a polynomial with those inside."""
-        return node_velocities(self.path, velocity_along(self.dynamics, self.position[self.ends], self.velocity))
+        return node_velocities(
+            self.path, velocity_along(self.dynamics, self.position[self.ends], self.velocity)
+        )
 
     @cached_property
     def loads(self) -> tuple[np.ndarray, np.ndarray]:
@@ -172,7 +179,7 @@ class Evidence:
 
     @cached_property
     def spin(self) -> float:
-        """Largest angular momentum per unit mass at the step ends [m^2/s]; at least that of the largest rate."""
+        """Largest angular momentum per unit mass at the step ends [m^2/s]; at least of the largest rate."""
         spins = np.linalg.norm(self.momentum[:, ~self.speeds], axis=1)
         moment = 0.0 if self.problem.inertia is None else float(np.trace(self.problem.inertia)) / 3
         return max(float(spins.max()), moment * self.rate / float(self.mass[0])) or 1.0

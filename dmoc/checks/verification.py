@@ -7,18 +7,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, of_kind, short
 from dmoc.basics.digits import lasting
+from dmoc.checks.balances import balance, energy_gap
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
-from dmoc.checks.turning import balance, held_wrench
-from dmoc.motion.dynamics import specific_lagrangian, state_symbols
 from dmoc.motion.march import node_masses, rollout
-from dmoc.motion.momenta import rates_along
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
 from dmoc.results.solution import Solution
@@ -34,8 +31,8 @@ ROLLOUT = 1e-8
 ROLLOUT_MOST = 1e-3
 # Momentum, mass and the reported arrays may be off by this part of themselves [-]: they are exact sums.
 LEDGER = 1e-8
-# The constraint of the coordinates may be off by this, the length of a quaternion squared by twice its own error
-# [-]: Ipopt meets rows to a tolerance.
+# The constraint of the coordinates, the square of a quaternion's length less 1, may be off by this [-]: Ipopt
+# meets rows to a tolerance.
 CONSTRAINT = 1e-10
 # A body may turn by less than this between neighbouring nodes [rad]: beyond it the scheme has other solutions.
 TURN_MOST = np.radians(90)
@@ -118,17 +115,14 @@ def verify(
     with np.errstate(all="ignore"):
         evidence = Evidence(solution)
         undefined = evidence.undefined()
-        wanted = [*CHECKS.items(), *_own(more)]
-        found = [
-            (name, Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}"))
-            if undefined
-            else (name, check(evidence))
-            for name, check in wanted
-        ]
+        turning = evidence.path.attitudes
+        ours = [(name, check) for name, check in CHECKS.items() if turning or check is not _constraint]
+        wanted = [*ours, *_own(more)]
         checks = tuple(
-            of_kind(f"what the check {name!r} gives", check, Check)
-            for name, check in found
-            if check is not None or name not in CHECKS
+            Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
+            if undefined
+            else of_kind(f"what the check {name!r} gives", check(evidence), Check)
+            for name, check in wanted
         )
     names = [check.name for check in checks]
     if not undefined and (twice := {name for name in names if names.count(name) > 1}):
@@ -151,7 +145,9 @@ def _residual(evidence: Evidence) -> Check:
     """
     defect = np.abs(evidence.rows) * (evidence.mass / evidence.weights)[:, None]
     actuator, mass = evidence.problem.actuator, evidence.mass.max()
-    scene = np.max([mass * np.abs(evidence.pulls).max(initial=0.0), mass * evidence.speed / evidence.path.duration])
+    scene = np.max(
+        [mass * np.abs(evidence.pulls).max(initial=0.0), mass * evidence.speed / evidence.path.duration]
+    )
     scale = np.max([actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
     # Positions are known to a rounding error of their size: no row can be better than that over h^2.
     floor = mass * evidence.rounding / evidence.shortest**2
@@ -162,11 +158,9 @@ def _residual(evidence: Evidence) -> Check:
     return Check.of("residual", defect[node, axis], allowed[axis], unit, note)
 
 
-def _constraint(evidence: Evidence) -> Check | None:
-    """The constraint g(q) = 0 of the coordinates at every node; None where there is none."""
+def _constraint(evidence: Evidence) -> Check:
+    """The constraint g(q) = 0 of the coordinates at every node."""
     lengths = [np.abs(np.sum(q * q, axis=1) - 1) for q in evidence.path.attitudes]
-    if not lengths:
-        return None
     node = int(np.argmax(lengths[0]))
     return Check.of("constraint", lengths[0][node], CONSTRAINT, "-", f"|q.q - 1| at node {node}")
 
@@ -243,7 +237,7 @@ def _ledger(evidence: Evidence) -> Check:
     mass = np.abs(evidence.mass - masses).max() / evidence.problem.mass
     exact = LEDGER + ROUNDING * evidence.acceleration * evidence.path.duration / gross
     value = np.max([momentum, mass, evidence.misreported()])
-    note, accuracy, energy = "energy is not kept here", _accuracy(evidence), _energy_gap(evidence)
+    note, accuracy, energy = "energy is not kept here", _accuracy(evidence), energy_gap(evidence)
     if energy is not None:
         note = f"energy to {energy:.1e} of {accuracy:g}"
     if evidence.mass.min() < evidence.mass.max():
@@ -251,35 +245,6 @@ def _ledger(evidence: Evidence) -> Check:
     if energy is not None and not energy <= accuracy:
         return Check.of("ledger", energy, accuracy, "of the energy", note)
     return Check.of("ledger", value, exact, "of the impulse", note)
-
-
-def _energy_gap(evidence: Evidence) -> float | None:
-    """Change of energy against work, over the largest of kinetic energy and total work; None if not kept."""
-    body = evidence.dynamics.configuration
-    t, q, v, m = state_symbols(body.size)
-    potential = ca.SX(specific_lagrangian(evidence.problem.effects, body, t, q, v, m))
-    if ca.depends_on(potential, t) or (evidence.dynamics.actuator.burns and ca.depends_on(potential, m)):
-        return None
-    at = [(evidence.time[i], evidence.position[i], evidence.velocity[i], evidence.mass[i]) for i in (0, -1)]
-    change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
-    parts, push = [], evidence.loads[1]
-    rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
-    if not evidence.path.hold:
-        power = (evidence.wrench / evidence.mass[:, None] + push) * rates
-        parts = np.sum(power, axis=1) * evidence.weights
-    elif body.surplus:
-        # A held force that is fixed to a turning body turns with it within a step.
-        held = held_wrench(evidence)
-        power = np.einsum("jkn,jkn->k", evidence.rule.weights[:, None, None] * held, rates[evidence.at])
-        work = power * evidence.path.duration * np.diff(evidence.path.mesh)
-        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
-    else:
-        # The work of a held force is that force times the way of its step.
-        moves = np.diff(evidence.position[evidence.ends], axis=0)
-        middle = evidence.mass[evidence.at].mean(axis=0)
-        work = np.sum(evidence.force * moves, axis=1) / middle
-        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
-    return float(abs(change - parts.sum()) / max(evidence.kinetic, np.abs(parts).sum()))
 
 
 def _bounds(evidence: Evidence) -> Check:

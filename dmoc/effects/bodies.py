@@ -132,7 +132,8 @@ class Plates:
         offsets = tuple(_three(f"offsets[{i}]", x, "m") for i, x in enumerate(entries(self.offsets) or ()))
         if not areas or not len(areas) == len(normals) == len(offsets):
             raise ValueError(
-                f"Plates: give one area, normal and offset each; got {len(areas)}, {len(normals)}, {len(offsets)}"
+                f"Plates: give an area, a normal and an offset each; got {len(areas)}, {len(normals)} "
+                f"and {len(offsets)}"
             )
         if not all(np.linalg.norm(normal) > 0 for normal in normals):
             raise ValueError(f"Plates: normals must not be zero; got {short(self.normals)}")
@@ -158,7 +159,7 @@ class Plates:
 
 @dataclass(frozen=True)
 class PlateDrag(BodyForce):
-    """Drag of free molecules on flat plates: rho |v|^2 A cos(incidence) against the motion, times a coefficient.
+    """Drag of free molecules on flat plates: rho |v|^2 A cos(incidence), times a coefficient.
 
     Parameters
     ----------

@@ -8,12 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.arguments import short
+from dmoc.basics.arguments import LARGEST, short
 from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
-from dmoc.guess.turning import as_point, attitudes_along, checked_turning, joined, turning_duration, turning_states
+from dmoc.guess.turning import (
+    as_point,
+    attitudes_along,
+    checked_turning,
+    joined,
+    turning_duration,
+    turning_states,
+)
 from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -38,9 +45,10 @@ def starting_guess(
     Raises
     ------
     ValueError
-        If the guess has another dimension than the problem or holds a number that is not finite.
+        If the guess has another dimension than the problem or holds a number that is not finite, or too large.
     """
     given = problem.guess if given is None else given
+    force = getattr(given, "force", None)
     given = getattr(given, "path", given)
     if problem.inertia is not None:
         return _turning_guess(problem, mesh, order, hold, given, duration)
@@ -49,6 +57,9 @@ def starting_guess(
             raise ValueError(
                 f"guess has {given.position.shape[1]} axes but the problem has {problem.dimension}"
             )
+        given.refuse_unusable("guess")
+        if given.control.shape[1] != problem.controls:
+            given = _of_other_controls(problem, given, force)
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = duration or guess_duration(problem)
@@ -64,9 +75,10 @@ def starting_guess(
         if not callable(given) and len(given) == 3:
             at = 0.5 * (mesh[1:] + mesh[:-1]) if hold else fractions
             control = _given_controls(problem, given, problem.start_time + duration * at)
-    if not np.isfinite(position).all():
-        node = int(np.argmin(np.isfinite(position).all(axis=1)))
-        raise ValueError(f"guess is not finite at node {node}: position {position[node]} m")
+    if (wrong := ~(np.abs(position) <= LARGEST).all(axis=1)).any():
+        node = int(np.argmax(wrong))
+        kind = "larger than any motion" if np.isfinite(position[node]).all() else "not finite"
+        raise ValueError(f"guess is {kind} at node {node}: position {position[node]} m")
     for constraint in problem.constraints:
         position = constraint.off_centre(position, fractions)
     for end, place in ((problem.start, 0), (problem.goal, -1)):
@@ -210,6 +222,14 @@ def guess_duration(problem: TransferProblem) -> float:
     return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
 
 
+def _of_other_controls(problem: TransferProblem, given: DiscretePath, force: np.ndarray | None) -> DiscretePath:
+    """A path of another actuator, with all the mass: its force [N], if known, as the controls of this one."""
+    control = None if force is None else controls_for(problem, force)
+    if control is None:
+        control = np.zeros((len(given.control), problem.controls))
+    return replace(given, control=control, mass=np.full(len(given.mass), problem.mass), multipliers={})
+
+
 def _given_path(problem: TransferProblem, given: Any, duration: float, fractions: np.ndarray) -> np.ndarray:
     times = problem.start_time + duration * fractions
     try:
@@ -236,7 +256,7 @@ def _given_path(problem: TransferProblem, given: Any, duration: float, fractions
 def _given_controls(problem: TransferProblem, given: Any, times: np.ndarray) -> np.ndarray:
     """The controls of a guess (times, positions, controls) at other times."""
     known, values = np.asarray(given[0], float), np.asarray(given[2], float)
-    if values.shape != (len(known), problem.controls) or not np.isfinite(values).all():
+    if values.shape != (len(known), problem.controls) or not (np.abs(values) <= LARGEST).all():
         raise ValueError(
             f"guess has controls of shape {values.shape} but needs finite numbers of shape "
             f"{(len(known), problem.controls)}: one row a time, "

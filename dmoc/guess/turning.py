@@ -18,7 +18,7 @@ from dmoc.basics.quaternions import (
     times,
     turned_by,
 )
-from dmoc.motion.configuration import configuration_of, quaternions_in, speeds_in
+from dmoc.motion.configuration import configuration_of, quaternions_in
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.forces import BallForce, FreeForce
 from dmoc.parts.objectives import Effort
@@ -27,8 +27,8 @@ from dmoc.scene.problem import TransferProblem
 # The attitude of a body of which neither end says how it is turned.
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 # The guess of a turn in least time is bent off the axis of the turn by this angle [rad]: on the axis itself the
-# turn is stationary, and up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie, J. Guid. Control Dyn. 16
-# (1993)).
+# turn is stationary, and up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie, J. Guid. Control Dyn.
+# 16 (1993)).
 BENT = 0.3
 # A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
 LEISURE = 1.2
@@ -73,7 +73,7 @@ def attitudes_along(problem: TransferProblem, duration: float, fractions: np.nda
 
 
 def turning_duration(problem: TransferProblem) -> float:
-    """A likely duration of a turn at the limit of torque [s], within the bounds; the middle of them without one."""
+    """A likely duration of a turn at the limit of torque [s]; the middle of the bounds without a limit."""
     shortest, longest = problem.duration_bounds
     middle = float(np.sqrt(shortest * longest))
     limit = problem.actuator.turning_limit()
@@ -87,7 +87,7 @@ def turning_duration(problem: TransferProblem) -> float:
 
 
 def followed(problem: TransferProblem, given: Any) -> TransferProblem:
-    """The problem whose goal has the sign of its quaternion to which a former path leads: the way round of it."""
+    """The problem whose goal has the sign of its quaternion to which a former path leads."""
     path = getattr(given, "path", given)
     if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
         return problem
@@ -113,7 +113,9 @@ def as_point(problem: TransferProblem) -> TransferProblem:
     )
 
 
-def checked_turning(problem: TransferProblem, given: Any, fractions: np.ndarray, times_at: np.ndarray) -> np.ndarray:
+def checked_turning(
+    problem: TransferProblem, given: Any, fractions: np.ndarray, times_at: np.ndarray
+) -> np.ndarray:
     """Coordinates along a user's own guess, attitudes made unit quaternions of one sign.
 
     Raises
@@ -135,7 +137,7 @@ def checked_turning(problem: TransferProblem, given: Any, fractions: np.ndarray,
             f"solution; {short(given)} fails: {' '.join(str(error).split())[:120]}"
         ) from error
     if position.shape != (len(fractions), body.size) or not np.isfinite(position).all():
-        raise ValueError(f"guess must give {body.size} finite coordinates, {names}; it gives {position.shape[-1]}")
+        raise ValueError(f"guess must give {body.size} finite coordinates, {names}; got {position.shape[-1]}")
     for at in quaternions_in(body.blocks):
         position[:, at] = in_one_sign(normalised(position[:, at]))
         goal = problem.goal.fixed()[0][at]
@@ -155,10 +157,9 @@ def joined(problem: TransferProblem, place: DiscretePath | None, guess: tuple) -
     for end, at in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[at, known] = end.fixed()[0][known]
-    velocities = [
+    first, last = (
         np.where(np.isnan(end.fixed()[1]), guessed, end.fixed()[1])
         for end, guessed in ((problem.start, start), (problem.goal, goal))
-    ]
-    assert len(velocities[0]) == len(speeds_in(body.blocks))
+    )
     mass = np.full(len(position), problem.mass)
-    return DiscretePath(mesh, order, hold, duration, position, control, mass, *velocities, blocks=body.blocks)
+    return DiscretePath(mesh, order, hold, duration, position, control, mass, first, last, blocks=body.blocks)

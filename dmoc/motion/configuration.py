@@ -40,9 +40,9 @@ class Configuration(ABC):
        `blocks`.
     2. Give the kinetic energy per unit mass: `kinetic`. Its derivatives, `inertia`, are CasADi's gradients
        unless they are overridden by shorter expressions.
-    3. Where there are more coordinates than freedom: the constraint `g`, its slope `pull` and the tangent matrix
-       `tangent`.
-    4. Say what an effect sees of it, `body`, and how a force and a torque act on its coordinates, `generalised`.
+    3. Where there are more coordinates than freedom: the constraint `g`, its slope `pull` and the tangent
+       matrix `tangent`.
+    4. Say what an effect sees of it, `body`, and how a force and a torque act on it, `generalised`.
 
     Not its business: effects, actuators, meshes and units.
     """

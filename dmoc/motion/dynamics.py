@@ -26,9 +26,7 @@ class Dynamics:
     @classmethod
     def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:
         """The dynamics of a transfer problem, with its own effects or with others in their place."""
-        return cls(
-            configuration_of(problem), problem.effects if effects is None else effects, problem.actuator
-        )
+        return cls(configuration_of(problem), problem.effects if effects is None else effects, problem.actuator)
 
     @property
     def positions(self) -> int:
@@ -68,7 +66,9 @@ class Dynamics:
         lagrangian = kinetic + specific_lagrangian(self.effects, self.configuration, t, q, v, m)
         energy = ca.Function("energy", [t, q, v, m], [ca.dot(v, ca.gradient(lagrangian, v)) - lagrangian])
         t, q, w, m, v = self.states()
-        return ca.Function("energy", [t, q, w, m], [energy(t, q, v, m)]) if self.configuration.surplus else energy
+        return (
+            ca.Function("energy", [t, q, w, m], [energy(t, q, v, m)]) if self.configuration.surplus else energy
+        )
 
     @remembered_property
     def momentum(self) -> ca.Function:
@@ -122,7 +122,7 @@ class Dynamics:
         _, _, slope, _ = self.symbols()
         dldq, dldv, push = point_function(self.effects, body, kinetic=False)(t, q, slope, m)
         if ca.depends_on(dldv[axes:], slope):
-            raise ValueError("a BodyConservative's lagrangian must not depend on the rate; state it as a BodyForce")
+            raise ValueError("a BodyConservative's lagrangian depends on the rate; state it as a BodyForce")
         change = ca.jacobian(dldv[:axes], q) @ slope + ca.jacobian(dldv[:axes], t)
         inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
         pulled = dldq + push
@@ -166,7 +166,7 @@ class Dynamics:
 
     @remembered_property
     def wrench(self) -> ca.Function:
-        """(q, u) -> the actuator's force in space axes [N] and, for a rigid body, its torque in body axes [N m]."""
+        """(q, u) -> the force in space axes [N] and, for a rigid body, the torque in body axes [N m]."""
         q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)
         force, torque = self.actuator.wrench(self.configuration.rotation(q), u)
         if not self.configuration.surplus:

@@ -104,6 +104,7 @@ def simulate(
         dynamics.controls,
     ):
         raise ValueError("the solution has another dimension or other controls than the problem")
+    path.refuse_unusable("controls")
     path = replace(path, mass=node_masses(dynamics, path, problem.mass))
     time = problem.start_time + path.duration * path.mesh
     mass = path.mass[:: scheme(path.order).degree]

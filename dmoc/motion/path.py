@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dmoc.basics.arguments import LARGEST, number
 from dmoc.basics.numerics import cubic_spline
 from dmoc.basics.quaternions import angle_between, normalised, times
 from dmoc.motion.configuration import QUATERNION, places_in, quaternions_in, speeds_in
@@ -115,6 +116,27 @@ class DiscretePath:
     def fractions(self) -> np.ndarray:
         """Fractions of the duration at the nodes, shape (nodes,)."""
         return node_fractions(self.mesh, scheme(self.order))
+
+    def refuse_unusable(self, name: str) -> None:
+        """Raise a ValueError if no solve or simulation can start here; `name` says whose path it is.
+
+        Every number must be finite and not too large, durations and masses positive: the last iterate of a
+        failed solve may be otherwise.
+        """
+        number(f"{name}: its duration", self.duration, "s", positive=True)
+        for what, values, unit in (
+            ("position", self.position, "m"),
+            ("control", self.control, ""),
+            ("mass", self.mass, "kg"),
+            ("start velocity", self.start_velocity, "m/s"),
+            ("goal velocity", self.goal_velocity, "m/s"),
+            *((f"multiplier {key}", each, "") for key, each in self.multipliers.items()),
+        ):
+            wrong = ~(np.abs(values) <= LARGEST) | ((values <= 0) if what == "mass" else False)
+            if wrong.any():
+                place = np.unravel_index(np.argmax(wrong), values.shape)
+                where = f"{name}: its {what} at {', '.join(map(str, place))}"
+                number(where, float(values[place]), unit, positive=what == "mass")
 
     def onto(self, mesh: np.ndarray, order: int, hold: bool) -> DiscretePath:
         """The same path on another mesh, order and kind of control."""

@@ -28,8 +28,8 @@ LOOKED_AT = 200
 HARMLESS = 0.5
 
 
-# A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its own
-# that are off by degrees, and Ipopt finds them.
+# A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its
+# own that are off by degrees, and Ipopt finds them.
 TURN_A_STEP = {2: np.radians(30), 4: np.radians(90), 6: np.radians(90), 8: np.radians(90)}
 
 
@@ -114,10 +114,10 @@ def _refuse_large_turns(guess: DiscretePath) -> None:
     """
     steps = len(guess.mesh) - 1
     if guess.attitudes and (enough := steps_to_turn(guess)) > steps:
-        angle = np.degrees(TURN_A_STEP[guess.order]) * enough / steps
+        most = np.degrees(TURN_A_STEP[guess.order])
         raise ValueError(
-            f"{steps} steps of order {guess.order} turn the body by up to {angle:.3g} degrees each, and no more "
-            f"than {np.degrees(TURN_A_STEP[guess.order]):.0f} degrees are followed; use at least {enough} steps"
+            f"{steps} steps of order {guess.order} turn the body by up to {most * enough / steps:.3g} degrees "
+            f"each, and no more than {most:.0f} are followed; use at least {enough} steps"
         )
 
 

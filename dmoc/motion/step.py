@@ -121,7 +121,9 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
     nodes = [q, *[q + move for move in moves]]
     momenta = step_momenta(scheme, point, t, h, nodes, m, push(nodes), body.blocks)
-    rows = ca.Function("rows", [y, *given], [_rows(dynamics, h, p, speed, [r + origin for r in nodes], momenta)])
+    rows = ca.Function(
+        "rows", [y, *given], [_rows(dynamics, h, p, speed, [r + origin for r in nodes], momenta)]
+    )
     # Convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off. The size of
     # the rows decides nothing.
     settings = {"abstol": 1e-300, "abstolStep": 1e-11, "max_iter": 30, "error_on_fail": False}
@@ -152,7 +154,9 @@ def _first_guess(dynamics: Dynamics, scheme: Scheme, h: Any, state: tuple) -> tu
     along = velocity * ca.DM(places.astype(float))
     linear = ca.sqrt(ca.dot(along, along) + 1e-300)
     # A body that turns by more than a radian a step leaves the scheme, so a quaternion changes by less than 1.
-    speed = ca.vertcat(*[linear + ca.norm_2(h * kick * ca.DM(places.astype(float))) if place else 1 / h for place in places])
+    speed = ca.vertcat(
+        *[linear + ca.norm_2(h * kick * ca.DM(places.astype(float))) if place else 1 / h for place in places]
+    )
     return ca.vertcat(*[c * velocity / speed for c in scheme.points[1:]]), speed
 
 
@@ -161,7 +165,7 @@ def _rows(dynamics: Dynamics, h: Any, p: Any, speed: Any, nodes: Sequence, momen
     body = dynamics.configuration
     if not body.surplus:
         return ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed
-    # Momenta of places are divided by their speed; those of attitudes have no scale that would change Newton's way.
+    # Momenta of places are divided by their speed; those of attitudes need no scale for Newton's method.
     first = body.along(nodes[0], momenta[0]) + p
     inner = [body.along(q, momentum) for q, momentum in zip(nodes[1:-1], momenta[1:-1], strict=True)]
     return ca.vertcat(first, *inner, *[body.g(q) for q in nodes[1:]])

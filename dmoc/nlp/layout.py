@@ -8,6 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dmoc.parts.rows import Row
+
+# The group of rows g(q) = 0 has this name.
+CONSTRAINT = "constraint"
+
 
 class Owner(NamedTuple):
     """The part of a problem that states rows: a field of `TransferProblem` and which of its entries.
@@ -23,6 +28,15 @@ class Owner(NamedTuple):
         """The part itself."""
         part = getattr(problem, self.field)
         return part[self.entry] if self.field == "constraints" else part
+
+
+class Limit(NamedTuple):
+    """A group of rows of its own: name, what its index counts, the rows, the part that states them."""
+
+    name: str
+    kind: str
+    rows: tuple[Row, ...]
+    owner: Owner | None
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.layout import Layout
-from dmoc.nlp.stencils import Limit, Stencil, Stencils
+from dmoc.nlp.layout import Layout, Limit
+from dmoc.nlp.stencils import Stencil, Stencils
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem

@@ -15,8 +15,7 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.ipopt import Answer
-from dmoc.nlp.layout import Group, Layout
-from dmoc.nlp.stencils import CONSTRAINT
+from dmoc.nlp.layout import CONSTRAINT, Group, Layout
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
 from dmoc.scene.problem import TransferProblem
@@ -104,7 +103,6 @@ class Program:
 
         Whether such a state keeps the limits is checked when the problem is made.
         """
-        places = places_in(self.dynamics.configuration.blocks)
         for end, place in (("start", 0), ("goal", -1)):
             position, velocity = getattr(problem, end).fixed()
             for group in self.rows.groups:

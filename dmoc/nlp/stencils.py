@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import casadi as ca
 
@@ -23,27 +23,16 @@ from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.assembly import Kernel, kernel
-from dmoc.nlp.layout import Owner
+from dmoc.nlp.layout import CONSTRAINT, Limit, Owner
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
-# The group of rows g(q) = 0 has this name.
-CONSTRAINT = "constraint"
 # A stencil takes all entries of a group, one for each evaluation.
 ALL = slice(None)
 # A stencil takes the first entry of a group: that of the start.
 FIRST = slice(0, 1)
 # A stencil takes the last entry of a group: that of the goal.
 LAST = slice(-1, None)
-
-
-class Limit(NamedTuple):
-    """A group of rows of its own: name, what its index counts, the rows, the part that states them."""
-
-    name: str
-    kind: str
-    rows: tuple[Row, ...]
-    owner: Owner | None
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class Units:
-    """Canonical units [m, s, N, kg, unit of the objective, N m] and the origin [m]; Ipopt sees numbers near 1."""
+    """Canonical units [m, s, N, kg, unit of the objective, N m] and the origin [m], for Ipopt."""
 
     length: float
     time: float
@@ -88,7 +88,9 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)])
     used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
     scales = path_scales(guess)
-    typical = float(np.trace(problem.inertia)) / 3 * max(scales.turn / guess.duration, scales.rate) / guess.duration
+    typical = (
+        float(np.trace(problem.inertia)) / 3 * max(scales.turn / guess.duration, scales.rate) / guess.duration
+    )
     limit = problem.actuator.torque_limit()
     if limit is not None:
         used = min(max(used, LEAST_SHARE * limit), limit) if used else limit

@@ -97,7 +97,7 @@ class Actuator(ABC):
         return self.force(u), None
 
     def effort(self, u: Any) -> Any:
-        """The square of the controls that `Effort` integrates: of the force or, where it turns the body, of all."""
+        """The square that `Effort` integrates: of the force or, where it turns the body, of all controls."""
         force = self.force(u)
         return ca.dot(force, force)
 

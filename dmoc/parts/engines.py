@@ -18,7 +18,7 @@ STANDARD_GRAVITY = 9.80665
 
 
 class Burner(Actuator):
-    """The fields and methods that engines, nozzles and thrusters share: exhaust velocity, dry mass, mass flow."""
+    """The fields and methods that engines, nozzles and thrusters share: exhaust, dry mass, mass flow."""
 
     exhaust_velocity: float | None
     dry_mass: float

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.plots.style import PALE, PUSH, readable
+from dmoc.plots.style import PALE, PUSH, plain_numbers, readable
 from dmoc.sweeps.data import result
 from dmoc.sweeps.plan import ordered
 
@@ -18,6 +18,9 @@ SUPERSCRIPTS = {"^2": "\u00b2", "^3": "\u00b3"}
 # Values whose largest is more than this many times the smallest are drawn on a logarithmic scale: on a linear
 # one the small ones would all lie at the bottom.
 WIDE_SPAN = 30.0
+# A parameter has a logarithmic axis only if its largest value is more than this many times the smallest [-]: on
+# a smaller span both kinds of axes look alike.
+FACTOR = 4.0
 # The front is drawn in this style, in a panel of its own or on the curve of the objective.
 FRONT: dict[str, Any] = {
     "color": PUSH,
@@ -42,9 +45,13 @@ def draw_front(axes: Any, data: Dataset, names: tuple[str, str]) -> None:
     else:
         size = readable(data[other].values, unit_of(data[other]))[0]
         colours = data[other].broadcast_like(pair[0]).transpose(*pair[0].dims).values[known] / size
-        dots = axes.scatter(x, y, c=colours, cmap="cividis", s=30)
+        norm = "log" if even_in_logs(data[other].values) else "linear"
+        dots = axes.scatter(x, y, c=colours, cmap="cividis", norm=norm, s=30)
         axes.figure.colorbar(dots, ax=axes, label=coordinate(data, other)[1])
     axes.plot(x[best], y[best], **FRONT)
+    if "duration" in data.coords and even_in_logs(data["duration"].values):
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis)
     if wide(y):
         axes.set_yscale("log")
     axes.set_xlabel(f"duration [{pretty(scales[0][1])}]")
@@ -87,12 +94,23 @@ def coordinate(data: Dataset, name: Any) -> tuple[np.ndarray, str]:
 
 
 def along(axis: Any, data: Dataset, name: Any) -> np.ndarray:
-    """Label an axis with a parameter; the places of the parameter's values on it."""
+    """Label and scale an axis for a parameter; the places of the parameter's values on it."""
     places, label = coordinate(data, name)
     axis.set_label_text(label)
+    if even_in_logs(data[name].values):
+        axis.axes.set(**{f"{axis.axis_name}scale": "log"})
     if not ordered(data[name].values):
         axis.set_ticks(places, [str(value) for value in data[name].values])
     return places
+
+
+def even_in_logs(values: np.ndarray) -> bool:
+    """Whether values of a parameter are spread rather by equal factors than by equal differences."""
+    if not ordered(values) or len(known := np.unique(values)) < 3 or known[0] <= 0:
+        return False
+    gaps = [np.diff(known), np.diff(np.log(known))]
+    uneven = [gap.std() / gap.mean() for gap in gaps]
+    return bool(known[-1] > FACTOR * known[0] and uneven[1] < uneven[0])
 
 
 def wide(values: np.ndarray) -> bool:

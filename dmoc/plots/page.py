@@ -178,15 +178,19 @@ def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) ->
 def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     times, speed = speeds(solution)
     size, unit = readable(speed, "m/s")
-    axes.plot(times / late, speed / size, color=PATH, label="speed")
+    name = "velocity" if solution.dimension == 1 else "speed"
+    axes.plot(times / late, speed / size, color=PATH, label=name)
+    # Rest is no way back, whatever the sign of its rounding error.
+    back = np.nanmin(speed) < -1e-6 * np.nanmax(np.abs(speed))
     for constraint in solution.problem.constraints if solution.problem else ():
         if (limit := constraint.largest_speed()) is not None:
-            axes.axhline(limit / size, label="limit", **LIMIT)
-    if np.nanmin(speed) < 0.5 * np.nanmax(speed):
+            for side in (limit, -limit) if back else (limit,):
+                axes.axhline(side / size, label="limit", **LIMIT)
+    if not back and np.nanmin(speed) < 0.5 * np.nanmax(speed):
         # A speed that never falls by half is drawn without the zero, so that its small changes can be seen.
         axes.set_ylim(bottom=0)
-    axes.set_ylabel(f"speed [{unit}]")
-    axes.set_title("Speed")
+    axes.set_ylabel(f"{name} [{unit}]")
+    axes.set_title(name.capitalize())
 
 
 def _headline(solution: Solution, late: float, late_unit: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.parts.outline import Ball, Box
-from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, readable, within_steps
+from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, readable, within_steps
 from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
 from dmoc.results.solution import Solution
 
@@ -18,6 +18,10 @@ MOST_DOTS = 40
 ARROWS = 20
 # The longest arrow of the force is this part of the extent [-].
 ARROW = 0.12
+# Numbers with powers of ten between these two are written without one [-], as in all other panels.
+PLAIN = SETTINGS["axes.formatter.limits"]
+# In space they are so below this power of ten [-]: at the corner of the box numbers of five digits overlap.
+PLAIN_IN_SPACE = 4
 # A plane path whose width is more than this many times its height gets a panel over the whole page.
 WIDE = 2.5
 
@@ -27,10 +31,10 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
     if solution.dimension == 1:
         _draw_line(axes, solution)
         return
-    size, unit = readable(np.ptp(solution.position, axis=0), "m")
+    low, high = _view(solution)
+    size, unit = _scale(solution, low, high)
     path = within_steps(solution, solution.position)[1] / size
     tails, arrows, longest = _arrows(solution)
-    low, high = _view(solution)
     view = low / size, high / size
     proxies = draw_scene(axes, solution, view, size)
     _mark_burns(axes, solution, solution.position.T / size)
@@ -47,6 +51,18 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
         axes.computed_zorder = False
     _frame(axes, view, unit)
     _legend(axes, proxies, beside)
+
+
+def _scale(solution: Solution, low: np.ndarray, high: np.ndarray) -> tuple[float, str]:
+    """Size [m] and name of the unit of all axes, such as `10^5 km`, for a view between two corners [m].
+
+    The power of ten belongs to the name: matplotlib would print one for each axis, and that of z on its label.
+    """
+    size, unit = readable(np.ptp(solution.position, axis=0), "m")
+    power = int(np.floor(np.log10(max(np.abs([low, high]).max() / size, 1e-300))))
+    if PLAIN[0] < power < (PLAIN_IN_SPACE if len(low) == 3 else PLAIN[1]):
+        return size, unit
+    return size * 10.0**power, f"$10^{{{power}}}$ {unit}"
 
 
 def is_wide(solution: Solution) -> bool:
@@ -162,15 +178,17 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
         axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
         # a short side has room for few numbers
         axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
+        # a power of ten of its own, as for a low z, would stand on the label
+        axis.set_major_formatter("{x:g}")
         # matplotlib measures this distance along the other two sides; make it the same for all three
-        least = 9.0 if name == "z" and not tall else 12.0
+        least = 12.0 if name != "z" else 17.0 if tall else 9.0
         axis.labelpad = max(18 * np.linalg.norm(spans) / np.delete(spans, i).max() - 21, least)
     for artist in (*axes.lines, *axes.collections):
-        # the enlarged box reaches beyond the rectangle that would clip it; only its sides are laid out
+        # marks on a side of the box reach beyond the rectangle that would clip them; its sides set the layout
         artist.set_clip_on(False)
         artist.set_in_layout(False)
-    # a tall box would reach into the legend below
-    axes.set_box_aspect(spans, zoom=0.88 if tall else 1.07)
+    # a tall box would reach into the legend below; a flat one that is enlarged would leave the page at the left
+    axes.set_box_aspect(spans, zoom=0.88 if tall else 1.0)
     axes.set_anchor("N")
     axes.view_init(elev=25, azim=-60)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.files import as_path, whole_file
 from dmoc.plots.page import SUFFIXES
-from dmoc.plots.style import DARK, SETTINGS
+from dmoc.plots.style import DARK, SETTINGS, plain_numbers
 from dmoc.studies.accuracy import COLD, COMPILED, Trial
 
 if TYPE_CHECKING:
@@ -97,16 +97,6 @@ def _draw(axes: Any, curves: dict[str, list[tuple[float, float]]]) -> list[tuple
         ends.append((x[-1], max(y[-1], 1e-16), name, style["color"]))
     plain_numbers(axes.xaxis)
     return ends
-
-
-def plain_numbers(axis: Any) -> None:
-    """Numbers such as 20 on a logarithmic axis, at 1, 2 and 5 of every decade if there is room, else at 1."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    low, high = axis.get_data_interval()
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _curve_style(name: str, others: list[str]) -> dict[str, Any]:

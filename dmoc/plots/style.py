@@ -29,8 +29,19 @@ PATH = "#0072B2"
 PUSH = "#E69F00"
 # Zones that are forbidden, and the walls of those to stay in, are pink.
 FORBIDDEN = "#CC79A7"
-# Attractors are yellow.
+# Attractors are yellow, as the Sun is ...
 ATTRACTOR = "#F0E442"
+# ... except these, told by their gravitational parameter [m^3/s^2], or in the three-body problem by their part
+# of it [-]: the Earth is sky blue, the Moon a pale grey, Mars red.
+BODIES = {
+    3.986004e14: "#56B4E9",
+    4.902800e12: "#BBBBBB",
+    4.282837e13: "#D55E00",
+    0.98785: "#56B4E9",
+    0.01215: "#BBBBBB",
+}
+# A parameter is one of these if it is no more than this part off [-]: published values differ by far less.
+ALIKE = 1e-3
 # Words and marks of a failure are of this dark red.
 WARNING = "#B03A00"
 
@@ -112,6 +123,8 @@ def flown_force(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
 def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and speeds [m/s] at the step ends, and above order 2 at the Gauss points between.
 
+    On a line they are velocities, whose sign tells forward from back.
+
     Elsewhere inside a step the derivative of its polynomial is less accurate than the path.
     """
     rule, times, velocity = scheme(solution.order), solution.end_times, solution.velocity
@@ -123,10 +136,21 @@ def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         times = np.append(times, _times(solution, points))
         velocity = np.concatenate([velocity, inside.reshape(-1, solution.dimension)])
     order = np.argsort(times, kind="stable")
-    return times[order], np.linalg.norm(velocity, axis=1)[order]
+    along = velocity[:, 0] if solution.dimension == 1 else np.linalg.norm(velocity, axis=1)
+    return times[order], along[order]
 
 
 def _times(solution: Solution, fractions: np.ndarray) -> np.ndarray:
     """Times of the same fractions of every step [s]."""
     ends = solution.end_times
     return (ends[:-1, None] + np.diff(ends)[:, None] * fractions).ravel()
+
+
+def plain_numbers(axis: Any) -> None:
+    """Numbers such as 20 on a logarithmic axis, at 1, 2 and 5 of every decade if there is room, else at 1."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_data_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.effects.base import Attractor
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.outline import Ball, Box, Cone, Shape
-from dmoc.plots.style import ATTRACTOR, DARK, FORBIDDEN
+from dmoc.plots.style import ALIKE, ATTRACTOR, BODIES, DARK, FORBIDDEN
 from dmoc.results.solution import Solution
 
 # Zones and attractors are shown up to this part of the extent beyond the path [-].
@@ -85,14 +85,21 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label=name))
     largest = max((source.mu for source in _sources(solution)), default=1.0)
     for (center, radius), source in zip(_attractors(solution), _sources(solution), strict=True):
+        colour = colour_of(source)
         if radius:
-            _draw_ball(axes, center / size, radius / size, view, ATTRACTOR, "attractor")
-            proxies.append(Patch(facecolor=ATTRACTOR, edgecolor=DARK, alpha=0.5, label="attractor"))
+            _draw_ball(axes, center / size, radius / size, view, colour, "attractor")
+            proxies.append(Patch(facecolor=colour, edgecolor=DARK, alpha=0.5, label="attractor"))
         elif (center / size > view[0]).all() and (center / size < view[1]).all():
-            style = {"linestyle": "none", "marker": "o", "markerfacecolor": ATTRACTOR, "markeredgecolor": DARK}
+            style = {"linestyle": "none", "marker": "o", "markerfacecolor": colour, "markeredgecolor": DARK}
             across = 13 if source.mu == largest else 9
             axes.plot(*(center[:, None] / size), markersize=across, label="attractor", **style)
     return proxies
+
+
+def colour_of(source: Attractor) -> str:
+    """The colour of a body that is known by its gravitational parameter, else that of any attractor."""
+    known = (colour for mu, colour in BODIES.items() if abs(source.mu - mu) < ALIKE * mu)
+    return next(known, ATTRACTOR)
 
 
 def outlines(solution: Solution) -> list[Shape]:

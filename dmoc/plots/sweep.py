@@ -20,7 +20,7 @@ from dmoc.plots.front import (
     unit_of,
     wide,
 )
-from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, WARNING, readable
+from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, WARNING, plain_numbers, readable
 from dmoc.sweeps.data import result
 
 if TYPE_CHECKING:
@@ -79,6 +79,9 @@ def sweep_figure(data: Dataset) -> Figure:
             _draw_map(panels[0], data)
         if front and not alone:
             draw_front(panels[1], data, front)
+        for axis in (panels[0].xaxis, panels[0].yaxis)[: 2 if sampled or objective.ndim > 1 else 1]:
+            if axis.get_scale() == "log":
+                plain_numbers(axis)
         page.suptitle(_sweep_headline(data), fontsize=16, color=DARK)
         words, good = _sweep_footnote(data)
         page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
@@ -138,13 +141,14 @@ def _draw_map(axes: Any, data: Dataset) -> None:
     x, y = along(axes.xaxis, data, across), along(axes.yaxis, data, up)
     size, unit = readable(best.values, unit_of(objective))
     values, solved = best.values.T / size, np.isfinite(best.values.T)
-    cells = axes.pcolormesh(_edges(x), _edges(y), values, norm=_norm(values), cmap="viridis")
+    edges = _edges(x, axes.get_xscale()), _edges(y, axes.get_yscale())
+    cells = axes.pcolormesh(*edges, values, norm=_norm(values), cmap="viridis")
     if min(values.shape) > 2 and solved.sum() > 8 and np.ptp(values[solved]) > 0:
         lines = axes.contour(x, y, values, levels=_levels(values), colors="white", linewidths=0.9)
         for text in axes.clabel(lines, fontsize=9, fmt="%.3g") if min(values.shape) >= LABELLED else ():
             text.set_path_effects([withStroke(linewidth=1.5, foreground=DARK)])
-    _hatch(axes, x, y, ~solved, "xxx", PALE, "not solved")
-    _hatch(axes, x, y, solved & ~held.T, "...", WARNING, "a check fails")
+    _hatch(axes, edges, ~solved, "xxx", PALE, "not solved")
+    _hatch(axes, edges, solved & ~held.T, "...", WARNING, "a check fails")
     if solved.any():
         row, column = np.unravel_index(np.nanargmin(sense * np.where(solved, values, np.nan)), values.shape)
         axes.plot(x[column], y[row], "*", color=FORBIDDEN, markersize=15, markeredgecolor="white", label="best")
@@ -172,22 +176,24 @@ def _draw_cloud(axes: Any, data: Dataset, names: list) -> None:
 
 
 def _hatch(
-    axes: Any, x: np.ndarray, y: np.ndarray, where: np.ndarray, hatch: str, colour: str, label: str
+    axes: Any, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, hatch: str, colour: str, label: str
 ) -> None:
     """Cells of a map covered with a pattern that is seen in print too."""
     from matplotlib.collections import PolyCollection
 
     if not where.any():
         return
-    left, low = _edges(x), _edges(y)
+    left, low = edges
     corners = [(0, 0), (0, 1), (1, 1), (1, 0)]
     cells = [[(left[i + di], low[j + dj]) for di, dj in corners] for j, i in np.argwhere(where)]
     pattern = PolyCollection(cells, facecolor="none", edgecolor=colour, linewidth=0.0, hatch=hatch, label=label)
     axes.add_collection(pattern, autolim=False)
 
 
-def _edges(centres: np.ndarray) -> np.ndarray:
-    """Where the cells around some centres meet."""
+def _edges(centres: np.ndarray, scale: str) -> np.ndarray:
+    """Where the cells around some centres meet, on an axis of this scale."""
+    if scale == "log":
+        return np.exp(_edges(np.log(centres), "linear"))
     if len(centres) == 1:
         return centres[0] + np.array([-0.5, 0.5])
     between = 0.5 * (centres[1:] + centres[:-1])

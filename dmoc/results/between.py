@@ -140,7 +140,9 @@ def turn_cuts(
         angle = np.radians(constraint.feature_angle())
         depth = turned**2 / (8 * np.tan(min(angle, np.pi - angle)) or 1.0)
         allowed = float(np.degrees(BOUND + min(depth, DEEPEST * angle)))
-        between = constraint.excess_at(start_time + path.duration * fractions, inside, np.zeros((len(inside), 3)))
+        between = constraint.excess_at(
+            start_time + path.duration * fractions, inside, np.zeros((len(inside), 3))
+        )
         broken = np.flatnonzero(between.reshape(steps, -1).max(axis=1) > allowed)
         yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, broken)
 

@@ -99,7 +99,12 @@ def _variables(solution: Any) -> Table:
             "torque": ((at, "body_axis"), solution.torque, "N m", f"torque in body axes{between}"),
             "start_rate": (("body_axis",), path.start_velocity[~speeds], "rad/s", "rate at the start"),
             "goal_rate": (("body_axis",), path.goal_velocity[~speeds], "rad/s", "rate at the goal"),
-            "reaction": (("node", "constraint"), path.reaction, "m2/s2", "force of the constraint per unit mass"),
+            "reaction": (
+                ("node", "constraint"),
+                path.reaction,
+                "m2/s2",
+                "constraint force per unit mass",
+            ),
         }
     variables: Table = {
         name: (dims, values, {"units": unit, "long_name": words})

@@ -104,7 +104,7 @@ class Attitude(Turning):
     def __post_init__(self) -> None:
         checked(self, quaternion=_quaternion(self.quaternion), rate=_rate(self.rate))
         if self.quaternion is None and all(entry is None for entry in self.rate or ()):
-            raise ValueError("Attitude: quaternion and rate are both None; fix at least one of them [-], [rad/s]")
+            raise ValueError("Attitude: quaternion and rate are both None; fix at least one of them")
 
     @property
     def has_position(self) -> bool:
@@ -181,46 +181,6 @@ class Pose(Turning):
         return f"{self.point.words()}, {_attitude_words(self._attitude)}, rate {_listed(self.rate)} rad/s"
 
 
-def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
-    """An inertia in body axes [kg m^2] as a symmetric matrix: from three numbers or a matrix.
-
-    Raises
-    ------
-    ValueError
-        If it is no inertia of a body: not symmetric, not positive, or one principal moment above the sum of
-        the others.
-    """
-    given = entries(value)
-    rows = None if given is None else [entries(row) for row in given]
-    if given is None or len(given) != AXES or rows is None:
-        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
-    if all(row is None for row in rows):
-        moments = [number(f"inertia[{i}]", x, "kg m^2", positive=True) for i, x in enumerate(given)]
-        matrix = np.diag(moments)
-    elif all(row is not None and len(row) == AXES for row in rows):
-        matrix = np.array(
-            [
-                [number(f"inertia[{i}][{j}]", x, "kg m^2") for j, x in enumerate(row or ())]
-                for i, row in enumerate(rows)
-            ]
-        )
-    else:
-        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
-    size = np.abs(matrix).max()
-    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
-        raise ValueError(f"inertia must be symmetric [kg m^2]; got {short(value)}")
-    small, middle, large = np.linalg.eigvalsh(matrix)
-    if small <= 0:
-        raise ValueError(f"inertia must have positive principal moments [kg m^2]; the smallest is {small:.3g}")
-    # A flat plate has equality; the rounding of numbers with nine digits is allowed for.
-    if large > (small + middle) * (1 + 1e-9):
-        raise ValueError(
-            f"no body has the principal moments {small:.4g}, {middle:.4g}, {large:.4g} kg m^2: none can be more "
-            "than the sum of the two others"
-        )
-    return tuple(tuple(float(x) for x in row) for row in 0.5 * (matrix + matrix.T))
-
-
 def _quaternion(value: Any) -> tuple[float, ...] | None:
     """A unit quaternion, or None for a free one."""
     if value is None:
@@ -235,7 +195,7 @@ def _quaternion(value: Any) -> tuple[float, ...] | None:
     length = float(np.linalg.norm(found))
     if abs(length - 1) > NEARLY_UNIT:
         raise ValueError(
-            f"an attitude must be a unit quaternion [-]; got {short(value)} of length {length:.6g}: divide it by that"
+            f"an attitude must be a unit quaternion [-]; got {short(value)} of length {length:.6g}"
         )
     return tuple(float(x) for x in found / length)
 

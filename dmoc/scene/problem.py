@@ -20,7 +20,7 @@ from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
-from dmoc.scene.poses import checked_inertia
+from dmoc.scene.inertia import check_acts_on, turning_checked
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -96,7 +96,7 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
-        self._check_turning()
+        checked(self, **turning_checked(self.inertia, self.start, self.goal))
         self._complete_ends()
         if self.objective.metered:
             checked(self, actuator=self.actuator.metered(self.dimension))
@@ -107,7 +107,7 @@ class TransferProblem:
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
         for part in parts:
             part.check_dimension(self.dimension)
-            self._check_body(part)
+            check_acts_on(part, self.inertia is not None, self.start.has_position)
         self._check_clock()
         _check_functions(self)
         self._check_objective()
@@ -172,38 +172,6 @@ class TransferProblem:
             )
         for end in ("start", "goal"):
             checked(self, **{end: getattr(self, end).with_dimension(dimension)})
-
-    def _check_turning(self) -> None:
-        """A body with an inertia turns, and both its ends say how."""
-        turning = {end: getattr(self, end).turns_body for end in ("start", "goal")}
-        if self.inertia is None:
-            if any(turning.values()):
-                raise ValueError(
-                    "a body with an attitude needs its inertia [kg m^2]: give inertia=(Jx, Jy, Jz) about its "
-                    "principal axes, or a matrix of three rows"
-                )
-            return
-        checked(self, inertia=checked_inertia(self.inertia))
-        for end, turns in turning.items():
-            if not turns:
-                raise ValueError(
-                    f"a body with an inertia turns, but its {end} has no attitude: use Pose(position, velocity, "
-                    "attitude, rate) or Attitude(quaternion, rate)"
-                )
-        if self.start.has_position != self.goal.has_position:
-            raise ValueError("one end is a Pose and the other an Attitude; use the same for both")
-        checked(self, goal=self.goal.oriented(self.start))
-
-    def _check_body(self, part: Any) -> None:
-        """A part that turns the body needs one that turns; one that moves it needs a position."""
-        if part.turns_body and self.inertia is None:
-            raise ValueError(
-                f"{type(part).__name__} acts on a body that turns; give the problem an inertia [kg m^2] and ends "
-                "with an attitude, Pose or Attitude"
-            )
-        if part.moves_body and not self.start.has_position:
-            remedy = "use Torque()" if part is self.actuator else "leave it out, or give the ends a position (Pose)"
-            raise ValueError(f"{type(part).__name__} acts on a position, but the ends are attitudes alone; {remedy}")
 
     def _check_clock(self) -> None:
         """Times of a transfer must differ by more than the rounding of the clock."""

@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.docstrings import documented, first_line
+from dmoc.basics.plain import unbroken
 
 if TYPE_CHECKING:
     from dmoc.scene.problem import TransferProblem
@@ -29,6 +30,9 @@ FUNCTION = "problem"
 # The module of a problem file is named by this and the file's own name: by it a line of a user's file is
 # recognised in a traceback.
 MODULE = "dmoc_problem_"
+# A line of a user's file and the message of its error are each cut off after this many letters: both should fit
+# on a few lines of a terminal.
+MOST_QUOTED = 160
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,9 @@ def find(name: str) -> Path:
         If there is none.
     """
     if name.endswith(".py") or "/" in name:
-        path = Path(name)
+        from dmoc.basics.files import as_path
+
+        path = as_path(name)
         if not path.is_file():
             raise ValueError(f"there is no problem file {name}; give a path to a .py file or a name")
         return path
@@ -139,19 +145,19 @@ def load_problem(name: str) -> ProblemFile:
         If it is not there, fails, or has no function `problem` with defaults for all its parameters.
     """
     path = find(str(name))
-    source = path.read_bytes()
+    source = _read(path)
     module = _guarded(path, lambda: _run(path, source))
     function = getattr(module, FUNCTION, None)
     if not callable(function):
         raise ValueError(f"{path} has no function {FUNCTION}(); add one that returns a dmoc.TransferProblem")
     entries = documented(inspect.getdoc(function))
     parameters = []
-    for name, given in inspect.signature(function).parameters.items():
+    for name, given in _guarded(path, lambda: inspect.signature(function)).parameters.items():
         if given.default is inspect.Parameter.empty:
             raise ValueError(f"{path}: parameter {name!r} of {FUNCTION}() has no default; give it one")
         unit, description = (entries[name].unit, entries[name].description) if name in entries else ("", "")
         parameters.append(Parameter(name, given.default, unit, description))
-    docstring = inspect.cleandoc(module.__doc__ or "") or (inspect.getdoc(function) or "")
+    docstring = inspect.getdoc(module) or inspect.getdoc(function) or ""
     digest = hashlib.sha256(source).hexdigest()
     return ProblemFile(path.stem, path, docstring, tuple(parameters), digest, function)
 
@@ -188,19 +194,26 @@ def _files() -> list[Path]:
         path
         for folder in folders()
         for path in sorted(folder.glob("*.py"))
-        if path.stem.isidentifier() and not path.stem.startswith("_")
+        if path.stem.isidentifier() and not path.stem.startswith("_") and path.is_file()
     ]
 
 
 def _summary(path: Path) -> str:
     try:
-        tree = ast.parse(path.read_bytes())
-    except (SyntaxError, ValueError) as error:
+        tree = ast.parse(_read(path))
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         return f"(not valid Python: {_one_line(error)})"
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == FUNCTION]
     if not functions:
         return f"(has no function {FUNCTION})"
     return first_line(ast.get_docstring(tree) or ast.get_docstring(functions[0]))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}; see who may read it") from None
 
 
 def _run(path: Path, source: bytes) -> ModuleType:
@@ -218,7 +231,9 @@ def _guarded(path: Path, call: Callable[[], Any]) -> Any:
     """The result of a user's code; its exceptions become a ValueError of one line, with the user's line."""
     try:
         return call()
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # `exit()` in a file is one of these
         number, text = _user_line(path, error)
         where = f"{path}, line {number} ({text})" if text else f"{path}, line {number}"
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
@@ -241,10 +256,10 @@ def users_line(error: BaseException) -> str:
 def _user_line(path: Path, error: BaseException) -> tuple[int, str]:
     """Number and text of the line of the problem file where an exception came from."""
     if isinstance(error, SyntaxError) and error.filename == str(path):
-        return error.lineno or 1, (error.text or "").strip()
+        return error.lineno or 1, _cut(error.text or "")
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     # The first line of a call over several lines ends with a parenthesis that is closed in a later one.
-    return (frames[-1].lineno or 1, (frames[-1].line or "").strip().rstrip("(")) if frames else (1, "")
+    return (frames[-1].lineno or 1, _cut(frames[-1].line or "").rstrip("(")) if frames else (1, "")
 
 
 def _check_type(name: str, value: Any, default: Any) -> None:
@@ -276,5 +291,10 @@ def _short(value: Any) -> str:
 
 
 def _one_line(error: BaseException) -> str:
-    text = error.msg if isinstance(error, SyntaxError) else str(error)
-    return " ".join(text.split()) or type(error).__name__
+    return _cut(error.msg if isinstance(error, SyntaxError) else str(error)) or type(error).__name__
+
+
+def _cut(text: str) -> str:
+    """A text on one line that is not too long."""
+    text = unbroken(text)
+    return text if len(text) <= MOST_QUOTED else f"{text[: MOST_QUOTED - 3]}..."

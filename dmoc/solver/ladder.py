@@ -158,9 +158,11 @@ class Ladder:
         """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration."""
         return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most}, pinned=pinned)
 
-    def ask(self, problem: TransferProblem, guess: DiscretePath, question: str) -> Rung:
+    def ask(
+        self, problem: TransferProblem, guess: DiscretePath, question: str, most: int = MOST_TRYING
+    ) -> Rung:
         """One attempt of few iterations at another problem, whose answer helps; `question` says what it is."""
-        return self._attempt(guess, problem, {"ipopt.max_iter": MOST_TRYING}, question=question)
+        return self._attempt(guess, problem, {"ipopt.max_iter": most}, question=question)
 
     def refine_on(self, guess: DiscretePath, pinned: bool = False) -> Rung:
         """Solve on a finer mesh from the answer on a coarser one, in a few hundred iterations or not at all.

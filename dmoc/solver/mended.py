@@ -148,6 +148,11 @@ def _noted(rung: Rung, note: str) -> Rung:
     return replace(rung, notes=(*rung.notes, note))
 
 
+def is_flyable(ladder: Ladder, rung: Rung) -> bool:
+    """Whether an answer is near one on a finer mesh: it cuts no zone, and hardly misses the goal."""
+    return not _cuts(ladder, rung) and goal_missed(ladder, rung.path) <= NEAR
+
+
 def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
     """By how much an independent integrator misses the goal, over the extent and speed of the path [-].
 
@@ -200,7 +205,11 @@ def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, fl
     _, ends = end_momenta(ladder.dynamics, path, ladder.problem.start_time)
     extent, linear = path.diagonal or 1.0, ends[:, speeds_in(path.parts)]
     speed = max(float(np.linalg.norm(linear, axis=1).max(initial=0.0)), extent / path.duration)
-    return node_velocities(path, velocity_along(ladder.dynamics, path.position[:: path.order // 2], ends)), extent, speed
+    return (
+        node_velocities(path, velocity_along(ladder.dynamics, path.position[:: path.order // 2], ends)),
+        extent,
+        speed,
+    )
 
 
 def _halved(mesh: np.ndarray, left: list[Cut]) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
 from dmoc.guess.turning import followed
 from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
@@ -14,6 +15,7 @@ from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import onto_goal, past_zones
 from dmoc.solver.meshes import first_path
 from dmoc.solver.revolutions import best_revolutions
+from dmoc.solver.starts import compared
 from dmoc.solver.tolerance import climb_to_tolerance
 
 
@@ -49,7 +51,8 @@ def solve(
         Forces constant over each step.
     guess
         Overrides the problem's own guess: function of time, (times, positions), (times, positions, controls),
-        a DiscretePath or a Solution.
+        a DiscretePath or a Solution. If the answer costs far more than what the program's own guess leads to
+        on a coarse mesh, a warning says so; a DiscretePath or a Solution of this process is not compared.
     options : dict
         CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
     progress : callable
@@ -91,23 +94,41 @@ def solve(
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
         tol = _tolerance(tol)
+    own = problem.guess if guess is None else guess
     with ladder.interrupt:
-        # To an orbit as a whole, durations hardly differ in cost: from a long one the refinement to a tolerance
-        # wanders (89 s instead of 7 s in one case), and no revolution is there to be missed.
-        anchored = problem.start.anchored and problem.goal.anchored
-        tried = guess is None and mesh is None and (anchored or tol is None)
-        best = best_revolutions(ladder, order, hold) if tried else None
-        if best is not None:
-            guess = best.path
-        if tol is not None:
-            return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
-        order = order or (None if best is None else best.nlp.scheme.order)
-        first = first_path(problem, order, steps, hold, guess, mesh)
-        pinned, given = best is not None and best.pinned, guess
-        rung = ladder.climb_to(first, given) if best is None else ladder.refine_on(first, pinned)
-        is_open = steps is None and mesh is None
-        rung = past_zones(ladder, rung, first, given, is_open)
-        return ladder.solution(onto_goal(ladder, rung, first, given, order, pinned) if is_open else rung)
+        solution = _solved(ladder, order, steps, tol, hold, mesh, guess)
+        # To solve again from the program's own guess would take longer than the warm start from an answer of
+        # this process; of one from a file nobody knows what it answers.
+        former = own is None or isinstance(own, DiscretePath) or getattr(own, "problem", None) is not None
+        return solution if former else compared(ladder, solution, hold)
+
+
+def _solved(
+    ladder: Ladder,
+    order: int | None,
+    steps: int | None,
+    tol: float | None,
+    hold: bool,
+    mesh: Any,
+    guess: Any,
+) -> Solution:
+    problem = ladder.problem
+    # To an orbit as a whole, durations hardly differ in cost: from a long one the refinement to a tolerance
+    # wanders (89 s instead of 7 s in one case), and no revolution is there to be missed.
+    anchored = problem.start.anchored and problem.goal.anchored
+    tried = guess is None and mesh is None and (anchored or tol is None)
+    best = best_revolutions(ladder, order, hold) if tried else None
+    if best is not None:
+        guess = best.path
+    if tol is not None:
+        return climb_to_tolerance(ladder, tol, order, steps, hold, guess)
+    order = order or (None if best is None else best.nlp.scheme.order)
+    first = first_path(problem, order, steps, hold, guess, mesh)
+    pinned, given = best is not None and best.pinned, guess
+    rung = ladder.climb_to(first, given) if best is None else ladder.refine_on(first, pinned)
+    is_open = steps is None and mesh is None
+    rung = past_zones(ladder, rung, first, given, is_open)
+    return ladder.solution(onto_goal(ladder, rung, first, given, order, pinned) if is_open else rung)
 
 
 def _tolerance(value: Any) -> float:

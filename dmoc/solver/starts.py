@@ -1,4 +1,4 @@
-"""More than one answer: several starting guesses on a coarse mesh, and the distinct optima they lead to."""
+"""More than one answer: the optima that several guesses lead to on a coarse mesh, and where a user's leads."""
 
 from __future__ import annotations
 
@@ -8,22 +8,34 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.digits import lasting
 from dmoc.basics.quaternions import times, turned_by
+from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.past_zones import ways_past
-from dmoc.guess.starting import starting_guess
+from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.guess.turning import followed
 from dmoc.motion.configuration import places_in, quaternions_in
 from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.nlp.transcription import check_mesh
+from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
+from dmoc.solver.mended import is_flyable
+from dmoc.solver.meshes import COARSEST_NODES, WIDEST_ROUNDING, coarse_to_fine, first_path, least_steps
 
 # Two answers can be one optimum only if the relative difference of their objectives is at most this [-].
 SAME_OBJECTIVE = 1e-4
 # Two answers can be one optimum only if their paths differ by less than this part of the extent [-].
 SAME_PATH = 1e-2
+# An answer from a user's guess is told to be dear if it costs more than this many times what the program's own
+# guess leads to [-]: a coarse mesh is a few parts in a hundred off, and optima that differ by less are common.
+DEAR = 1.5
+# The answer from the program's own guess is looked for in this many iterations: half of what others get.
+MOST_COMPARING = 75
+# Costs below this part of the problem's unit of cost are next to nothing [-]: the errors of a coarse mesh are
+# about as large.
+NOTHING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -73,6 +85,47 @@ def local_optima(
     return sorted(found, key=lambda optimum: problem.objective.sense * optimum.objective)
 
 
+def compared(ladder: Ladder, solution: Solution, hold: bool) -> Solution:
+    """An answer from a user's guess, with a warning if the program's own guess leads to a far cheaper one.
+
+    From that guess the problem is solved once, on a coarse mesh, in few iterations; the attempt stands in the
+    ladder. Nothing is compared over very many revolutions, where that guess takes long, nor with an answer that
+    is good for its mesh alone.
+    """
+    problem = replace(ladder.problem, guess=None)
+    turns = angle_around(problem, solution.path) / (2 * np.pi)
+    if not solution.optimal or ladder.interrupt.seen or turns > VERY_MANY_TURNS:
+        return solution
+    first = first_path(problem, None if solution.order == 2 else solution.order, None, hold)
+    order, meshes = coarse_to_fine(problem, first)
+    engine: Any = problem.actuator
+    if engine.smoothing is not None:
+        problem = replace(problem, actuator=replace(engine, smoothing=max(WIDEST_ROUNDING, engine.smoothing)))
+    start = starting_guess(problem, meshes[0], order, hold)
+    rung = ladder.ask(problem, start, "the program's own guess", MOST_COMPARING)
+    solution = replace(solution, ladder=(*solution.ladder, rung.level))
+    given, own = solution.objective, rung.level.objective
+    if (
+        not rung.solved
+        or not _is_dear(problem, given, own, rung.nlp.units.cost)
+        or not is_flyable(ladder, rung)
+    ):
+        return solution
+    unit = solution.provenance.objective_unit
+    costs = [lasting(cost) if unit == "s" else f"{cost:.3g} {unit}".rstrip() for cost in (given, own)]
+    told = (
+        f"the guess leads to {problem.objective.label} {costs[0]}, the program's own guess to about "
+        f"{costs[1]}: leave it out, or give another one"
+    )
+    return replace(solution, warnings=(*solution.warnings, told))
+
+
+def _is_dear(problem: TransferProblem, given: float, own: float, unit: float) -> bool:
+    """Whether one objective is far worse than another; where next to nothing is paid, `unit` stands in."""
+    lost = problem.objective.sense * (given - own)
+    return lost > (DEAR - 1) * max(min(abs(given), abs(own)), NOTHING * unit)
+
+
 def _add(found: list[Optimum], new: Optimum) -> None:
     """Add the start of an optimum to an equal one that was found before, or else the optimum to the list."""
     scales = path_scales(new.path).coordinates
@@ -113,7 +166,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
 
 
 def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
-    """Names and guesses of a body that turns, without end: the other way round, then bends of both its turns."""
+    """Names and guesses of a body that turns, without end: the other way round, then bends of both."""
     ways = [("", base)]
     if not np.isnan(problem.goal.fixed()[0][-4:]).any():
         other = replace(problem, goal=problem.goal.the_other_way())

@@ -201,7 +201,9 @@ def _checked_meshes(steps: Any, default: dict[str, tuple[int, ...]]) -> dict[str
     return meshes
 
 
-def _trial(problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: Scales) -> Trial:
+def _trial(
+    problem: TransferProblem, labels: tuple, timed: Sequence[Run], known: tuple, scales: Scales
+) -> Trial:
     (name, order, steps, climbs), (value, doubt) = labels, known
     last, solve_s = timed[-1], median(run.solve_s for run in timed)
     return Trial(

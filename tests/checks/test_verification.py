@@ -59,9 +59,7 @@ def with_path(solution, **changes):
     problem = solution.problem
     dynamics = Dynamics.of(problem)
     momentum, velocity = end_momenta(dynamics, path, problem.start_time)
-    return replace(
-        solution, path=path, momentum=momentum, velocity=velocity, force=force_of(dynamics, path)
-    )
+    return replace(solution, path=path, momentum=momentum, velocity=velocity, force=force_of(dynamics, path))
 
 
 def nudged(values, place, by):

@@ -286,8 +286,10 @@ def test_saved_solutions_are_checked_drawn_simulated_and_started_from(run, folde
     assert code == 0 and (folder / "again.svg").exists()
     code, out, _ = run("simulate", "drone_hop", "--set", "mass=0.9", "--controls", "hop.nc")
     assert code == 0 and re.search(r"final position +\(12, 5, 6\) m", out)
-    _, out, _ = run("solve", "drone_hop", "--set", "mass=0.9", "--guess", "hop.nc", "--json")
-    assert json.loads(out)["iterations"] <= 3
+    _, out, _ = run("solve", "drone_hop", "--set", "mass=0.9", "--guess", "hop.nc")
+    # from there few iterations are left; beside them the program's own guess is tried on a coarse mesh
+    assert re.search(r"^ +2 +400 +[1-3] ", out, re.M)
+    assert re.search(r"^ +2 +100 +\d+ ", out, re.M)
 
 
 def test_check_finds_a_spoiled_solution(run, folder):

@@ -386,6 +386,21 @@ def test_speeds_that_hardly_change_fill_their_panel():
     assert high - low < 1.5 * np.ptp(speed)
 
 
+def test_on_a_line_the_velocity_is_drawn_with_its_sign():
+    """Up and down again; limits of the speed stand on both sides."""
+    back = TransferProblem(
+        1.0, State([0], [1.0]), State([0], [-1.5]), 6.0, constraints=[SpeedLimit(2.0)], name="back"
+    )
+    solution = solve(back, steps=20)
+    axes = panels(solution)["speed"]
+    (curve,) = [line for line in axes.lines if line.get_label() == "velocity"]
+    assert curve.get_ydata() == pytest.approx(solution.velocity[:, 0])
+    assert levels(axes, "limit") == [-2.0, 2.0]
+    assert axes.get_ylabel() == "velocity [m/s]" and axes.get_title("left") == "Velocity"
+    forth = panels(solved("1-D"))["speed"]
+    assert forth.get_ylim()[0] == 0 and forth.get_ylabel() == "velocity [m/s]"
+
+
 def test_nozzles_are_limited_one_by_one():
     nozzles = Nozzles([(1, 0), (-1, 0), (0, 1), (0, -1)], 1.5)
     solution = solve(room(actuator=nozzles, constraints=()), steps=10)

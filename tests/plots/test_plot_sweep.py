@@ -9,7 +9,9 @@ import dmoc
 from dmoc.cli.app import main
 from dmoc.plots.front import pareto
 from dmoc.plots.sweep import save_sweep, sweep_figure
+from dmoc.scene.problem_file import Parameter
 from dmoc.sweeps.data import is_sweep, read_sweep, sweep_dataset, write_sweep
+from dmoc.sweeps.plan import Plan
 
 
 def picture(plan, value, **more):
@@ -65,10 +67,52 @@ def test_two_parameters_are_a_map_with_failures_hatched(tmp_path):
 def test_contours_bear_numbers_where_these_do_not_overlap(across, up):
     """Wherever there are numbers, no two of them share ink: on the steepest side of a map."""
     page = sweep_figure(picture(plan_of(across, up), lambda at: 1 + at["p0"] ** 2 + at["p1"] ** 4))
-    page.canvas.draw()
+    page.draw_without_rendering()
     boxes = [text.get_window_extent() for text in page.axes[0].texts]
     assert bool(boxes) == (min(across, up) >= 12)
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def stretched(*axes, sampled=False):
+    """Parameters p0, p1, ... whose values are these."""
+    values = tuple(np.asarray(axis) for axis in axes)
+    parameters = tuple(Parameter(f"p{i}", 1.0) for i in range(len(values)))
+    return Plan(parameters, values, sampled)
+
+
+EQUAL_FACTORS, EQUAL_STEPS = np.geomspace(1.0, 1000.0, 7), np.linspace(1.0, 1000.0, 7)
+
+
+@pytest.mark.parametrize(
+    ("values", "scale"),
+    [
+        (EQUAL_FACTORS, "log"),
+        ([1.0, 2.0, 5.0, 10.0, 20.0, 50.0], "log"),
+        (EQUAL_STEPS, "linear"),
+        ([-1.0, 1.0, 10.0, 100.0], "linear"),
+        ([0.0, 1.0, 10.0, 100.0], "linear"),
+        (np.geomspace(10.0, 20.0, 7), "linear"),
+        ([1.0, 1000.0], "linear"),
+    ],
+)
+def test_values_at_equal_factors_have_a_logarithmic_axis(values, scale):
+    (axes,) = sweep_figure(picture(stretched(values), lambda at: 1 + at["p0"] ** 2)).axes
+    assert axes.get_xscale() == scale
+    if scale == "log":
+        axes.figure.draw_without_rendering()
+        assert {"10", "1"} <= {text.get_text() for text in axes.get_xticklabels()}
+
+
+def test_the_cells_of_a_logarithmic_map_have_equal_widths():
+    data = picture(stretched(EQUAL_FACTORS, EQUAL_STEPS), lambda at: None if at["p0"] < 2 else 1 + at["p0"])
+    axes = sweep_figure(data).axes[0]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
+    mesh = next(one for one in axes.collections if hasattr(one, "get_coordinates"))
+    places = mesh.get_coordinates()
+    assert np.allclose(np.diff(np.log(places[0, :, 0])), np.log(1000) / 6)
+    assert np.allclose(np.diff(places[:, 0, 1]), 999 / 6)
+    hatched = [c for c in axes.collections if c.get_label() == "not solved"]
+    assert hatched[0].get_paths()[0].vertices[:, 0].min() == pytest.approx(places[0, 0, 0])
 
 
 def test_the_front_is_what_no_other_beats_in_both():

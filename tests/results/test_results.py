@@ -116,9 +116,11 @@ def test_a_loaded_solution_is_as_good_a_guess(case, tmp_path):
     solution.save(tmp_path / "s.nc")
     again = solve(problem, guess=load(tmp_path / "s.nc"), **arguments)
     assert again.success
-    assert again.iterations <= 3
+    # Of an answer from a file, what the program's own guess leads to is asked beside.
+    own = sum(level.iterations for level in again.ladder if not level.question)
+    assert own <= 3
     assert again.objective == pytest.approx(solution.objective, rel=1e-8)
-    assert again.iterations == solve(problem, guess=solution, **arguments).iterations
+    assert own == solve(problem, guess=solution, **arguments).iterations
 
 
 def test_provenance_is_kept(tmp_path):

@@ -52,7 +52,9 @@ class _Cone(_OfAttitude):
     unit: ClassVar[str] = "degrees"
 
     def __post_init__(self) -> None:
-        checked(self, axis=_unit("axis", self.axis), angle=number("angle", self.angle, "degrees", positive=True))
+        checked(
+            self, axis=_unit("axis", self.axis), angle=number("angle", self.angle, "degrees", positive=True)
+        )
         if self.angle >= 180:
             raise ValueError(f"{type(self).__name__}: angle must be less than 180 degrees; got {self.angle:g}")
         if not callable(self.direction):
@@ -84,7 +86,9 @@ class _Cone(_OfAttitude):
             toward = ca.Function("toward", [time], [ca.densify(self._toward(time))])(t[None]).full().T
         else:
             toward = np.broadcast_to(np.asarray(self.direction, float), axis.shape)
-        return np.degrees(np.arctan2(np.linalg.norm(np.cross(axis, toward), axis=1), np.sum(axis * toward, axis=1)))
+        return np.degrees(
+            np.arctan2(np.linalg.norm(np.cross(axis, toward), axis=1), np.sum(axis * toward, axis=1))
+        )
 
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return self.excess_at(np.zeros(len(q)), q, v)
@@ -126,7 +130,7 @@ class PointingKeepOut(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine < 1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-out {index} of at most {down(eased.angle)} degrees (you gave {self.angle:g} degrees)"
+        return f"pointing keep-out {index} of at most {down(eased.angle)} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()
@@ -158,7 +162,9 @@ class PointingKeepIn(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine > -1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-in {index} of at least {up(eased.angle)} degrees (you gave {self.angle:g} degrees)"
+        return (
+            f"pointing keep-in {index} of at least {up(eased.angle)} degrees (you gave {self.angle:g} degrees)"
+        )
 
     def words(self) -> str:
         axis, toward = self._where()

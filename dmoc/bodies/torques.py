@@ -1,24 +1,22 @@
-"""What pushes a body that turns: torques, wrenches, and thrusters fixed to the body."""
+"""Torques, and wrenches of a force and a torque."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, checked, entries, flag, limits, number, short, times_each, vector
+from dmoc.basics.arguments import Vector, checked, limits, short, times_each
 from dmoc.basics.digits import up
 from dmoc.parts.actuator import Actuator
-from dmoc.parts.engines import Burner
 
 # A body in space has these many axes.
 AXES = 3
 
 
-class _OnBody(Actuator):
+class OnBody(Actuator):
     """What actuators of rigid bodies share: their controls, squared and added up, are their effort."""
 
     @property
@@ -34,7 +32,7 @@ class _OnBody(Actuator):
 
 
 @dataclass(frozen=True)
-class Torque(_OnBody):
+class Torque(OnBody):
     """A torque in body axes, about the centre of mass: |tau_i| <= limit_i, or without a limit.
 
     Parameters
@@ -106,7 +104,7 @@ class Torque(_OnBody):
 
 
 @dataclass(frozen=True, init=False)
-class Wrench(_OnBody):
+class Wrench(OnBody):
     """A force through the centre of mass and a torque, both in body axes.
 
     Parameters
@@ -177,7 +175,8 @@ class Wrench(_OnBody):
 
     def times(self, factor: float) -> Wrench:
         force, torque = (
-            None if bound is None else times_each(bound, factor) for bound in (self.most_force, self.most_torque)
+            None if bound is None else times_each(bound, factor)
+            for bound in (self.most_force, self.most_torque)
         )
         return Wrench(force, torque, self.frame)
 
@@ -218,136 +217,11 @@ class Wrench(_OnBody):
         return f"{' and '.join(parts)}, the force in {self.frame} axes"
 
 
-@dataclass(frozen=True)
-class Thrusters(_OnBody, Burner):
-    """Thrusters fixed to the body, each with a thrust between 0 and its largest.
-
-    The force in body axes is sum_i u_i d_i, the torque about the centre of mass sum_i u_i r_i x d_i. Where they
-    burn propellant, the inertia shrinks in proportion to the mass and the centre of mass stays where it is.
-
-    Parameters
-    ----------
-    positions : sequence of sequences
-        Where each thruster sits, from the centre of mass in body axes [m], one row a thruster.
-    directions : sequence of sequences
-        Direction of the force that each makes, in body axes [-]; made unit vectors.
-    max_thrust : float or sequence of float, optional
-        Largest thrust [N], one number or one a thruster; without a limit only if they push both ways.
-    both_ways : bool
-        Whether each can push against its direction, too.
-    specific_impulse, exhaust_velocity, dry_mass
-        As for `Engine`.
-    """
-
-    positions: Sequence[Vector] | np.ndarray
-    directions: Sequence[Vector] | np.ndarray
-    max_thrust: float | Vector | None = None
-    both_ways: bool = False
-    specific_impulse: float | None = None
-    exhaust_velocity: float | None = None
-    dry_mass: float = 0.0
-    limit_label = "limit of\na thruster"
-
-    def __post_init__(self) -> None:
-        places, ways = _rows("positions", self.positions, "m"), _rows("directions", self.directions, "-")
-        if len(places) != len(ways):
-            raise ValueError(
-                f"Thrusters: there are {len(places)} positions but {len(ways)} directions; give one each a thruster"
-            )
-        lengths = [float(np.linalg.norm(way)) for way in ways]
-        if min(lengths) == 0:
-            raise ValueError(f"Thrusters: directions must not be zero; got {short(self.directions)}")
-        units = tuple(tuple(x / length for x in way) for way, length in zip(ways, lengths, strict=True))
-        checked(self, positions=places, directions=units, both_ways=flag("both_ways", self.both_ways))
-        self._check_thrust(len(units))
-        self._check_exhaust(self.specific_impulse)
-        if self.burns and self.both_ways:
-            raise ValueError("Thrusters: those that burn push one way; state each way as a thruster of its own")
-
-    def _check_thrust(self, count: int) -> None:
-        if self.max_thrust is None:
-            if not self.both_ways:
-                raise ValueError("Thrusters: give max_thrust [N]; only thrusters that push both ways need none")
-            return
-        given = entries(self.max_thrust)
-        thrusts = (self.max_thrust,) * count if given is None else given
-        if len(thrusts) != count:
-            raise ValueError(
-                f"Thrusters: max_thrust has {len(thrusts)} entries but there are {count} thrusters; "
-                f"give one number [N] or {count}"
-            )
-        most = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
-        checked(self, max_thrust=most)
-
-    @property
-    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
-        return ("exhaust_velocity",) if self.burns else ()
-
-    @property
-    def structure(self) -> tuple:
-        return type(self), self.burns, self.positions, self.directions
-
-    def size(self, dimension: int) -> int:
-        return len(self.directions)
-
-    def labels(self, dimension: int) -> tuple[str, ...]:
-        return tuple(f"thruster_{i + 1}" for i in range(len(self.directions)))
-
-    def force(self, u: Any) -> Any:
-        return ca.DM(np.array(self.directions).T) @ u
-
-    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
-        arms = np.cross(np.array(self.positions), np.array(self.directions))
-        return rotation @ self.force(u), ca.DM(arms.T) @ u
-
-    def throttle(self, u: Any) -> Any:
-        return ca.sum1(u)
-
-    def metered(self, dimension: int) -> Actuator:
-        if self.both_ways:
-            raise ValueError(
-                "least fuel with Thrusters that push both ways has no smooth cost; state each way as a thruster of "
-                "its own, both_ways=False"
-            )
-        return self
-
-    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        limit = np.full(len(self.directions), np.inf) if self.max_thrust is None else np.array(self.max_thrust)
-        return (-limit if self.both_ways else np.zeros(len(limit))), limit
-
-    def force_limit(self) -> float | None:
-        return None if self.max_thrust is None else float(np.max(self.max_thrust))
-
-    def turning_limit(self) -> float | None:
-        if self.max_thrust is None:
-            return None
-        arms = np.cross(np.array(self.positions), np.array(self.directions)) * np.array(self.max_thrust)[:, None]
-        # Of the thrusters that turn the body one way about an axis, all fire: the weakest axis counts.
-        ways = [np.maximum(sign * arms, 0).sum(axis=0) for sign in (1, -1)]
-        weakest = float(np.min(np.maximum(*ways) if self.both_ways else np.minimum(*ways)))
-        return weakest or float(np.linalg.norm(arms, axis=1).max()) or None
-
-    def times(self, factor: float) -> Thrusters:
-        return self if self.max_thrust is None else replace(self, max_thrust=times_each(self.max_thrust, factor))
-
-    def words(self) -> str:
-        most = "without a limit" if self.max_thrust is None else f"of at most {self.force_limit():g} N"
-        ways = " both ways" if self.both_ways else ""
-        return f"{len(self.directions)} thrusters fixed to the body, {most}{ways}{self._burning_words()}"
-
-
 def _three(name: str, value: Any, unit: str) -> float | tuple:
     found = limits(name, value, unit)
     if isinstance(found, tuple) and len(found) != AXES:
         raise ValueError(f"{name} must be one number or three, one a body axis [{unit}]; got {short(value)}")
     return found
-
-
-def _rows(name: str, value: Any, unit: str) -> tuple[tuple[float, ...], ...]:
-    rows = tuple(vector(f"{name}[{i}]", row, unit) for i, row in enumerate(entries(value) or ()))
-    if not rows or any(len(row) != AXES for row in rows):
-        raise ValueError(f"Thrusters: {name} must be rows of three numbers [{unit}]; got {short(value)}")
-    return rows
 
 
 def _listed(value: Any) -> str:

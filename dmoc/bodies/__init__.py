@@ -1,0 +1,1 @@
+"""What pushes and limits a body that turns."""

@@ -1,0 +1,87 @@
+"""Balances of a path: momentum and spin against impulses, energy against work."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.quaternions import rotated
+from dmoc.checks.evidence import Evidence
+from dmoc.motion.configuration import quaternions_in
+from dmoc.motion.dynamics import specific_lagrangian, state_symbols
+from dmoc.motion.march import wrench_of
+from dmoc.motion.momenta import along_path, rates_along
+
+
+def balance(evidence: Evidence) -> tuple[float, float]:
+    """By how much momentum and impulse differ, over all impulses [-], and the sum of all impulses [m/s].
+
+    The sums are exact: what a step gives to its nodes, added up, is the impulse of forces alone. For a body
+    that turns the same holds for its angular momentum about the centre of mass, seen in space axes: R(q) turns
+    what each node gets from body axes, and the inertia's part adds up to nothing.
+    """
+    nodes = np.concatenate(evidence.position[evidence.at])
+    impulse = along_path(evidence.dynamics, nodes, np.concatenate(evidence.momenta))
+    ends = [evidence.boundary_momentum(place) for place in (0, -1)]
+    first, last = (
+        _in_space(evidence, evidence.position[[place]], end[None])
+        for place, end in zip((0, -1), ends, strict=True)
+    )
+    # Added up over a step, the parts of the inertia cancel, and the impulse is left.
+    given = _in_space(evidence, nodes, impulse).reshape(*evidence.at.shape, -1).sum(axis=0)
+    change, speeds = (last - first)[0], evidence.speeds
+    gross = float(np.abs(given[:, speeds]).sum()) + evidence.speed
+    off = np.abs(change - given.sum(axis=0))
+    error = off[speeds].max(initial=0.0) / gross
+    if not speeds.all():
+        spins = float(np.abs(given[:, ~speeds]).sum()) + evidence.spin
+        error = max(error, off[~speeds].max() / spins)
+    return float(error), gross
+
+
+def _in_space(evidence: Evidence, position: np.ndarray, momenta: np.ndarray) -> np.ndarray:
+    """Momenta, one row a place, with the spins turned from body into space axes."""
+    found = momenta.copy()
+    for at in quaternions_in(evidence.path.parts):
+        found[:, ~evidence.speeds] = rotated(position[:, at], momenta[:, ~evidence.speeds])
+    return found
+
+
+def _held(evidence: Evidence) -> np.ndarray:
+    """What a held control does per unit mass at each node of its step, shape (s+1, steps, freedom)."""
+    return np.array(
+        [
+            wrench_of(evidence.dynamics, evidence.position[at], evidence.path.control)
+            / evidence.mass[at][:, None]
+            for at in evidence.at
+        ]
+    )
+
+
+def energy_gap(evidence: Evidence) -> float | None:
+    """Change of energy against work, over the largest of kinetic energy and total work; None if not kept."""
+    body = evidence.dynamics.configuration
+    t, q, v, m = state_symbols(body.size)
+    potential = ca.SX(specific_lagrangian(evidence.problem.effects, body, t, q, v, m))
+    if ca.depends_on(potential, t) or (evidence.dynamics.actuator.burns and ca.depends_on(potential, m)):
+        return None
+    at = [(evidence.time[i], evidence.position[i], evidence.velocity[i], evidence.mass[i]) for i in (0, -1)]
+    change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
+    push = evidence.loads[1]
+    rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
+    if not evidence.path.hold:
+        power = (evidence.wrench / evidence.mass[:, None] + push) * rates
+        parts = np.sum(power, axis=1) * evidence.weights
+    elif body.surplus:
+        # A held force that is fixed to a turning body turns with it within a step.
+        held = _held(evidence)
+        power = np.einsum("jkn,jkn->k", evidence.rule.weights[:, None, None] * held, rates[evidence.at])
+        work = power * evidence.path.duration * np.diff(evidence.path.mesh)
+        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
+    else:
+        # The work of a held force is that force times the way of its step.
+        moves = np.diff(evidence.position[evidence.ends], axis=0)
+        middle = evidence.mass[evidence.at].mean(axis=0)
+        work = np.sum(evidence.force * moves, axis=1) / middle
+        parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
+    return float(abs(change - parts.sum()) / max(evidence.kinetic, np.abs(parts).sum()))

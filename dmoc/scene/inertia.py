@@ -1,0 +1,101 @@
+"""The inertia of a body, and whether the parts of a problem fit one that turns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import entries, number, short
+from dmoc.scene.ends import Boundary
+
+# An inertia has so many principal moments.
+AXES = 3
+
+
+def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
+    """An inertia in body axes [kg m^2] as a symmetric matrix: from three numbers or a matrix.
+
+    Raises
+    ------
+    ValueError
+        If it is no inertia of a body: not symmetric, not positive, or one principal moment above the sum of
+        the others.
+    """
+    given = entries(value)
+    rows = None if given is None else [entries(row) for row in given]
+    if given is None or len(given) != AXES or rows is None:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    if all(row is None for row in rows):
+        moments = [number(f"inertia[{i}]", x, "kg m^2", positive=True) for i, x in enumerate(given)]
+        matrix = np.diag(moments)
+    elif all(row is not None and len(row) == AXES for row in rows):
+        matrix = np.array(
+            [
+                [number(f"inertia[{i}][{j}]", x, "kg m^2") for j, x in enumerate(row or ())]
+                for i, row in enumerate(rows)
+            ]
+        )
+    else:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    size = np.abs(matrix).max()
+    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
+        raise ValueError(f"inertia must be symmetric [kg m^2]; got {short(value)}")
+    small, middle, large = np.linalg.eigvalsh(matrix)
+    if small <= 0:
+        raise ValueError(f"inertia must have positive principal moments [kg m^2]; the smallest is {small:.3g}")
+    # A flat plate has equality; the rounding of numbers with nine digits is allowed for.
+    if large > (small + middle) * (1 + 1e-9):
+        raise ValueError(
+            f"no body has the principal moments {small:.4g}, {middle:.4g}, {large:.4g} kg m^2: none can be "
+            "more than the sum of the two others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in 0.5 * (matrix + matrix.T))
+
+
+def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
+    """The inertia and the goal of a problem, checked: a body with an inertia turns, and both its ends say how.
+
+    Raises
+    ------
+    ValueError
+        If one is given without the other.
+    """
+    ends = {"start": start, "goal": goal}
+    if inertia is None:
+        if any(end.turns_body for end in ends.values()):
+            raise ValueError(
+                "a body with an attitude needs its inertia [kg m^2]: give inertia=(Jx, Jy, Jz) about its "
+                "principal axes, or a matrix of three rows"
+            )
+        return {}
+    for name, end in ends.items():
+        if not end.turns_body:
+            raise ValueError(
+                f"a body with an inertia turns, but its {name} has no attitude: use Pose(position, velocity, "
+                "attitude, rate) or Attitude(quaternion, rate)"
+            )
+    if start.has_position != goal.has_position:
+        raise ValueError("one end is a Pose and the other an Attitude; use the same for both")
+    return {"inertia": checked_inertia(inertia), "goal": goal.oriented(start)}
+
+
+def check_acts_on(part: Any, turns: bool, moves: bool) -> None:
+    """A part that turns the body needs one that turns; one that moves it needs a position.
+
+    Raises
+    ------
+    ValueError
+        If the body has not what the part needs.
+    """
+    name = type(part).__name__
+    if part.turns_body and not turns:
+        raise ValueError(
+            f"{name} acts on a body that turns; give the problem an inertia [kg m^2] and ends with an "
+            "attitude, Pose or Attitude"
+        )
+    if part.moves_body and not moves:
+        raise ValueError(
+            f"{name} acts on a position, but the ends are attitudes alone; use what acts on attitudes, such as "
+            "Torque(), or give the ends a position (Pose)"
+        )
