@@ -50,6 +50,7 @@ class _Cone(_OfAttitude):
     direction: Vector | Callable
     angle: float
     unit: ClassVar[str] = "degrees"
+    keeps_out: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checked(
@@ -81,14 +82,29 @@ class _Cone(_OfAttitude):
     def angles(self, t: np.ndarray, attitude: np.ndarray) -> np.ndarray:
         """The angle between axis and direction at each time and attitude [degrees]."""
         axis = rotated(attitude, np.broadcast_to(np.asarray(self.axis, float), (len(attitude), 3)))
-        if callable(self.direction):
-            time = ca.SX.sym("t")
-            toward = ca.Function("toward", [time], [ca.densify(self._toward(time))])(t[None]).full().T
-        else:
-            toward = np.broadcast_to(np.asarray(self.direction, float), axis.shape)
+        toward = self._directions(t)
         return np.degrees(
             np.arctan2(np.linalg.norm(np.cross(axis, toward), axis=1), np.sum(axis * toward, axis=1))
         )
+
+    def _directions(self, t: np.ndarray) -> np.ndarray:
+        """The direction at each time, shape (count, 3)."""
+        if not callable(self.direction):
+            return np.broadcast_to(np.asarray(self.direction, float), (len(t), 3))
+        time = ca.SX.sym("t")
+        return ca.Function("toward", [time], [ca.densify(self._toward(time))])(t[None]).full().T
+
+    def on_sphere(self, times: np.ndarray, points: int) -> tuple[bool, list[np.ndarray]]:
+        turn, angle = np.linspace(0, 2 * np.pi, points)[:, None], np.radians(self.angle)
+        rings = []
+        for toward in self._directions(times if callable(self.direction) else times[:1]):
+            aside = np.cross(toward, np.eye(3)[np.argmin(np.abs(toward))])
+            aside /= np.linalg.norm(aside)
+            across = np.cross(toward, aside)
+            rings.append(
+                np.cos(angle) * toward + np.sin(angle) * (np.cos(turn) * aside + np.sin(turn) * across)
+            )
+        return self.keeps_out, rings
 
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return self.excess_at(np.zeros(len(q)), q, v)
@@ -150,6 +166,8 @@ class PointingKeepIn(_Cone):
     angle : float
         Half angle of the cone [degrees], more than 0 and less than 180.
     """
+
+    keeps_out: ClassVar[bool] = False
 
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
         return [Row("cosine", self._cosine(t, body) - ca.cos(self.angle * np.pi / 180), 0.0, np.inf)]

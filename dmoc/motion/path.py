@@ -15,6 +15,11 @@ from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
 
 
+# A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
+# by the optimiser, and errors of that size are no errors of a turn.
+LEAST_TURN = 1e-4
+
+
 class Key(NamedTuple):
     """The name of a group of multipliers, which belong to rows ("row") or to unknowns ("column").
 
@@ -286,7 +291,7 @@ def path_scales(path: DiscretePath) -> Scales:
     length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
     speed = max(length / path.duration, ends) or extent / path.duration
     spins = float(np.linalg.norm(both[:, ~speeds], axis=1).max())
-    turn = path.turn or min(spins * path.duration, np.pi) or 1.0
+    turn = max(path.turn, LEAST_TURN) if path.attitudes else 1.0
     turned = sum(float(angle_between(q[1:], q[:-1]).sum()) for q in path.attitudes)
     rate = max(turned / path.duration, spins) or turn / path.duration
     return Scales(extent, speed, turn, rate, tuple(path.parts))

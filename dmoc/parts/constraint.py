@@ -135,6 +135,13 @@ class Constraint(ABC):
         """Its shapes in a picture."""
         return ()
 
+    def on_sphere(self, times: np.ndarray, points: int) -> tuple[bool, list[np.ndarray]] | None:
+        """Whether directions are kept out, and the circles on the unit sphere at some times that bound them.
+
+        Each circle has shape (points, 3); None where it does not limit a direction.
+        """
+        return None
+
     def feature(self) -> float:
         """Size of the smallest thing that a path must not step over [m]; infinite if there is none."""
         return np.inf

@@ -34,7 +34,7 @@ def _keeps_energy(solution: Solution) -> bool:
     if dynamics is None or dynamics.depends_on_time:
         return False
     t, q, v, m = dynamics.symbols()
-    potential = ca.SX(specific_lagrangian(dynamics.effects, t, q, v, m))
+    potential = ca.SX(specific_lagrangian(dynamics.effects, dynamics.configuration, t, q, v, m))
     return not (np.ptp(solution.path.mass) > 0 and ca.depends_on(potential, m))
 
 

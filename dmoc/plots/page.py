@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,
     DARK,
-    PALE,
+    LIMIT,
     PATH,
     PUSH,
     SETTINGS,
@@ -25,6 +26,7 @@ from dmoc.plots.style import (
     readable,
     speeds,
 )
+from dmoc.plots.turning import control_panels, draw_angle, draw_controls, draw_rates, draw_sphere
 from dmoc.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -39,8 +41,6 @@ SQUARED = "\u00b2"
 # A limit of more than this many times the largest force is told in the legend alone: its line would flatten the
 # curves.
 FAR = 6.0
-# Limits are drawn in this style, dashed and behind the curves.
-LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
 def save_figure(
@@ -91,11 +91,12 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
         page.set_layout_engine(
             "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
         )
-        wide = is_wide(solution)
-        path, panels = _panels(page, solution.dimension, wide)
-        draw_path(path, solution, beside=wide)
+        turns = bool(solution.path.attitudes)
+        wide, drawn = is_wide(solution), _turning_panels(solution) if turns else PANELS
+        path, panels = _panels(page, 3 if turns else solution.dimension, wide, len(drawn))
+        (draw_path if solution.dimension else draw_sphere)(path, solution, **({"beside": True} if wide else {}))
         size, unit = time_axis = readable(solution.end_times, "s")
-        for panel, draw in zip(panels, (_draw_force, _draw_speed, draw_ledger), strict=True):
+        for panel, draw in zip(panels, drawn, strict=True):
             draw(panel, solution, size)
             _shade_burns(panel, solution, size)
             where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.05)}
@@ -114,14 +115,20 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
     return page
 
 
-def _panels(page: Figure, dimension: int, wide: bool) -> tuple[Any, list[Any]]:
+def _turning_panels(solution: Solution) -> list[Any]:
+    """What is drawn over time of a body that turns: its controls by their units, rates and the angle to go."""
+    controls = [partial(draw_controls, panel=panel) for panel in control_panels(solution)]
+    return [*controls, draw_rates, draw_angle]
+
+
+def _panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[Any, list[Any]]:
     """The path panel on the left, or above if it is wide, and those over time."""
     if wide:
         grid = page.add_gridspec(2, 3, height_ratios=(1.5, 1.0))
         return page.add_subplot(grid[0, :]), [page.add_subplot(grid[1, column]) for column in range(3)]
-    grid = page.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+    grid = page.add_gridspec(count, 2, width_ratios=(1.15, 1.0))
     path = page.add_subplot(grid[:, 0], projection="3d" if dimension == 3 else None)
-    return path, [page.add_subplot(grid[row, 1]) for row in range(3)]
+    return path, [page.add_subplot(grid[row, 1]) for row in range(count)]
 
 
 def _shade_burns(axes: Any, solution: Solution, late: float) -> None:
@@ -223,3 +230,7 @@ def _footnote(solution: Solution, report: Report | None) -> tuple[str, bool]:
     failed = [check.name for check in report.checks if not check.ok]
     words = f"checks failed: {', '.join(failed)}" if failed else f"all {len(report.checks)} checks hold"
     return f"{mesh}; {words}{scene}", not failed
+
+
+# What is drawn over time of a point mass.
+PANELS = (_draw_force, _draw_speed, draw_ledger)

@@ -10,6 +10,7 @@ import numpy as np
 from dmoc.parts.outline import Ball, Box
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, readable, within_steps
 from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
+from dmoc.plots.turning import draw_triads
 from dmoc.results.solution import Solution
 
 # Step ends are drawn as dots if there are at most this many steps: more would hide the line.
@@ -38,12 +39,15 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
     view = low / size, high / size
     proxies = draw_scene(axes, solution, view, size)
     _mark_burns(axes, solution, solution.position.T / size)
-    axes.plot(*path.T, color=PATH, label="path", zorder=3)
+    # Beside the axes of a body, the path has a colour of its own.
+    axes.plot(*path.T, color=DARK if solution.path.attitudes else PATH, label="path", zorder=3)
     if solution.steps <= MOST_DOTS:
         ends = solution.position[:: solution.order // 2] / size
         axes.plot(*ends.T, ".", color=PATH, label="step ends", zorder=3)
     proxies += _draw_arrows(axes, tails / size, arrows / size, longest)
     _mark_ends(axes, path[:1].T, path[-1:].T)
+    if solution.path.attitudes:
+        draw_triads(axes, solution, size)
     if solution.dimension == 3:
         floor = np.full(len(path), view[0][2])
         axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label="its shadow", zorder=0)
@@ -67,6 +71,8 @@ def _scale(solution: Solution, low: np.ndarray, high: np.ndarray) -> tuple[float
 
 def is_wide(solution: Solution) -> bool:
     """Whether a path in the plane and its surroundings are much wider than high."""
+    if solution.dimension != 2:
+        return False
     spans = np.subtract(*_view(solution)[::-1])
     return solution.dimension == 2 and bool(spans[0] > WIDE * spans[1])
 
@@ -78,6 +84,8 @@ def _view(solution: Solution) -> Corners:
 
 def burning(solution: Solution) -> np.ndarray | None:
     """Where an engine that also coasts is on: a value a node, or a step if held; None for what never coasts."""
+    if solution.path.attitudes:
+        return None
     strength = np.linalg.norm(solution.force, axis=1)
     # The rounding of |F| at zero leaves a little thrust while coasting, far below a fiftieth.
     on = strength > 0.02 * strength.max(initial=0.0)

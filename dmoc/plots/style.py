@@ -10,7 +10,7 @@ from dmoc.basics.digits import TIMES
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.march import force_of
+from dmoc.motion.march import wrench_of
 from dmoc.motion.mesh import step_nodes
 from dmoc.results.solution import Solution
 
@@ -83,6 +83,8 @@ _UNITS = {
 POINTS = 600
 # ... and no more than this many in one step.
 MOST_WITHIN = 30
+# Limits are drawn in this style, dashed and behind the curves.
+LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1.4, "zorder": 0.9}
 
 
 def readable(values: Any, unit: str) -> tuple[float, str]:
@@ -114,10 +116,23 @@ def flown_force(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     rule = scheme(solution.order)
     if rule.degree == 1 or solution.problem is None:
         return within_steps(solution, solution.force)
-    dynamics = Dynamics.of(solution.problem)
+    times, control = flown_control(solution)
+    # The force of a point mass does not hang on its place.
+    anywhere = np.repeat(solution.path.position[:1], len(control), axis=0)
+    return times, wrench_of(Dynamics.of(solution.problem), anywhere, control)
+
+
+def flown_control(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and controls that are flown, close enough to draw; held ones as steps."""
+    rule = scheme(solution.order)
+    if solution.hold:
+        ends = np.repeat(solution.end_times, 2)[1:-1]
+        return ends, np.repeat(solution.path.control, 2, axis=0)
+    if rule.degree == 1 or solution.problem is None:
+        return within_steps(solution, solution.path.control)
     count = int(np.clip(POINTS // solution.steps, 2 * rule.degree, MOST_WITHIN))
-    fractions, control = flown(dynamics, solution.path).sampled(count)
-    return solution.provenance.start_time + solution.duration * fractions, force_of(dynamics, control)
+    fractions, control = flown(Dynamics.of(solution.problem), solution.path).sampled(count)
+    return solution.provenance.start_time + solution.duration * fractions, control
 
 
 def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:

@@ -11,9 +11,23 @@ from dmoc.basics.digits import lasting
 if TYPE_CHECKING:
     import numpy as np
 
+    from dmoc.motion.march import Trajectory
     from dmoc.results.solution import Solution
     from dmoc.scene.ends import Boundary
     from dmoc.scene.problem import TransferProblem
+
+
+def body_words(problem: TransferProblem) -> str:
+    """Mass and axes of the body, and its principal moments if it turns."""
+    axes = f"axes {', '.join('xyz'[: problem.dimension])}"
+    if problem.inertia is None:
+        return f"{problem.mass:g} kg, {axes}"
+    import numpy as np
+
+    moments = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(np.array(problem.inertia)))
+    moved = f"{axes} and attitude" if problem.start.has_position else "attitude alone"
+    law = ", which shrink with the mass" if problem.actuator.burns else ""
+    return f"{problem.mass:g} kg, {moved}, principal moments {moments} kg m^2{law}"
 
 
 def start_words(problem: TransferProblem) -> str:
@@ -45,5 +59,17 @@ def _places(end: Boundary, times: Sequence[float]) -> str:
     return ", " + " and ".join(places)
 
 
-def _point(position: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.5g}" for value in position) + ")"
+def _point(position: np.ndarray, digits: int = 5) -> str:
+    return "(" + ", ".join(f"{value:.{digits}g}" for value in position) + ")"
+
+
+def final_rows(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Where a simulation ends."""
+    found = [
+        ("final position", trajectory.position, "m"),
+        ("final velocity", trajectory.velocity, "m/s"),
+        ("final attitude", trajectory.attitude, "(scalar first, body to space)"),
+        ("final rate", trajectory.rate, "rad/s in body axes"),
+    ]
+    known = [(name, rows[-1], unit) for name, rows, unit in found if rows is not None and rows.shape[1]]
+    return [(name, f"{_point(last, 10)} {unit}") for name, last, unit in known]

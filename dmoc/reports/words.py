@@ -19,7 +19,7 @@ from rich.text import Text
 
 from dmoc.basics.digits import lasting
 from dmoc.basics.docstrings import documented, first_line
-from dmoc.reports.ends import goal_words, met_words, start_words
+from dmoc.reports.ends import body_words, final_rows, goal_words, met_words, start_words
 from dmoc.reports.verdict import verdict_words
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def scene(problem: TransferProblem) -> RenderableType:
     free = f"free between {lasting(shortest, 6)} and {lasting(longest, 6)}"
     return pairs(
         [
-            ("body", f"{problem.mass:g} kg, axes {', '.join('xyz'[: problem.dimension])}"),
+            ("body", body_words(problem)),
             ("start", start_words(problem)),
             ("goal", goal_words(problem)),
             ("duration", free if problem.free_duration else lasting(shortest, 6)),
@@ -198,8 +198,7 @@ def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> Ren
     share = f", {most / scale:.1e} of it" if scale else ""
     rows = [
         ("final time", lasting(trajectory.time[-1], 10)),
-        ("final position", f"{value_words(trajectory.position[-1].tolist())} m"),
-        ("final velocity", f"{value_words(trajectory.velocity[-1].tolist())} m/s"),
+        *final_rows(trajectory),
         ("final mass", f"{trajectory.mass[-1]:.10g} kg"),
         ("energy", f"{energy[0]:.10g} J/kg at the start, {energy[-1]:.10g} J/kg at the end"),
         ("energy drift" if kept else "energy change", f"{most:.2e} J/kg at most{share}"),
