@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext, redirect_stdout
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,16 +23,19 @@ def stability(
     revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
     eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
     steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
+    turned: Annotated[int, typer.Option(help="Steps of the bodies that turn, at least 10.")] = 10_000,
     plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure numerical stability: drift over many revolutions, rounding, the longest stable steps.
 
-    Coasts Kepler orbits by the schemes of order 2 to 8, by RK4 and by DOP853.
+    Coasts Kepler orbits and turns a free body and a heavy top by the schemes of order 2 to 8, by RK4 and by
+    DOP853.
     """
     from dmoc.reports import words as report
     from dmoc.studies.drift import drift, kepler, per_revolution
     from dmoc.studies.rounding import growth, round_off
+    from dmoc.studies.spinning import free_body, heavy_top, spin
 
     writable(plot, drawn=True)
     orbits = [(kepler(value), per_revolution(value)) for value in _eccentricities(eccentricity)]
@@ -40,6 +44,7 @@ def stability(
         rounding = round_off(steps)
         edges = growth()
         runs = [(orbit.name, drift(orbit, revolutions, methods)) for orbit, methods in orbits]
+        turns = [(body.name, spin(body, turned)) for body in (free_body(), heavy_top())]
     if plot is not None:
         from dmoc.plots.stability import stability_figure
         from dmoc.plots.study import save_page
@@ -48,10 +53,10 @@ def stability(
     if as_json:
         from dmoc.reports.as_json import as_text
 
-        print(as_text(_object(runs, rounding, edges)))
+        print(as_text(_object(runs, rounding, edges, turns)))
         return
     console = report.console()
-    for part in _tables(runs, rounding, edges):
+    for part in _tables(runs, rounding, edges, turns):
         console.print(part)
     if plot is not None:
         console.print(f"wrote {plot}")
@@ -64,7 +69,7 @@ def _eccentricities(text: str) -> list[float]:
         raise ValueError(f"--eccentricity must be numbers with commas, such as 0.3,0.7; got {text!r}") from None
 
 
-def _object(runs: list, rounding: list, edges: list) -> dict[str, Any]:
+def _object(runs: list, rounding: list, edges: list, turns: list) -> dict[str, Any]:
     """The JSON object."""
     figures = ("method", "steps", "revolutions", "energy_error", "momentum_error", "growth", "seconds")
 
@@ -74,6 +79,7 @@ def _object(runs: list, rounding: list, edges: list) -> dict[str, Any]:
             for orbit, rows in runs
             for row in rows
         ],
+        "turning": [{"body": body} | asdict(row) for body, rows in turns for row in rows],
         "round_off": [
             {
                 "form": row.form,
@@ -91,7 +97,7 @@ def _object(runs: list, rounding: list, edges: list) -> dict[str, Any]:
     }
 
 
-def _tables(runs: list, rounding: list, edges: list) -> list[RenderableType]:
+def _tables(runs: list, rounding: list, edges: list, turns: list) -> list[RenderableType]:
     from rich.text import Text
 
     parts: list[RenderableType] = []
@@ -116,7 +122,25 @@ def _tables(runs: list, rounding: list, edges: list) -> list[RenderableType]:
         # a growth below 1 is amplitude lost; at h omega = 1 a step is a sixth of an oscillation
         lost = 1 - float(row.growth[row.reach.searchsorted(1.0)])
         table.add_row(row.method, f"{low:.3f}", until, f"{lost:.1e}" if lost > 1e-12 else "nothing")
-    return [*parts, table]
+    return [*parts, table, "", *_turning_tables(turns)]
+
+
+def _turning_tables(turns: list) -> list[RenderableType]:
+    from rich.text import Text
+
+    parts: list[RenderableType] = []
+    for body, rows in turns:
+        parts.append(Text(f"A {body}, turning freely, {rows[0].steps:,} steps", "bold"))
+        table = _right_aligned(
+            "method", "h [s]", "us/step", "|q.q - 1|", "angular momentum", "energy", "growth"
+        )
+        for row in rows:
+            figures = (row.norm_error, row.momentum_error, row.energy_error)
+            cost = f"{1e6 * row.seconds / row.steps:.0f}"
+            errors = [f"{figure:.1e}" for figure in figures]
+            table.add_row(row.method, f"{row.length:g}", cost, *errors, f"{row.growth:.2g}")
+        parts += [table, ""]
+    return parts
 
 
 def _drift_table(rows: list) -> Table:

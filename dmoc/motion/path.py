@@ -14,7 +14,6 @@ from dmoc.motion.configuration import QUATERNION, places_in, quaternions_in, spe
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
 
-
 # A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
 # by the optimiser, and errors of that size are no errors of a turn.
 LEAST_TURN = 1e-4

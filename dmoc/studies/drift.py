@@ -186,8 +186,8 @@ def step_function(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca
 def _variational(order: int, dynamics: Dynamics, problem: TransferProblem) -> ca.Function:
     """(position and momentum, t, h) -> position and momentum one step later."""
     n, rule = dynamics.positions, scheme(order)
-    state, t, h = ca.MX.sym("state", 2 * n), ca.MX.sym("t"), ca.MX.sym("h")
-    mass, still = problem.mass * ca.DM.ones(rule.degree + 1), ca.DM.zeros(n, rule.degree + 1)
+    state, t, h = ca.MX.sym("state", n + dynamics.freedom), ca.MX.sym("t"), ca.MX.sym("h")
+    mass, still = problem.mass * ca.DM.ones(rule.degree + 1), ca.DM.zeros(dynamics.controls, rule.degree + 1)
     dq, dp, _ = step_map(dynamics, rule)(state[:n], state[n:], mass, still, t, h, ca.DM.zeros(n))
     step = ca.Function("step", [state, t, h], [state + ca.vertcat(dq, dp)])
     # where a step has no equation to solve, it is one plain expression, which is three times as fast
@@ -200,8 +200,8 @@ def _explicit(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Fun
     # a Runge-Kutta method is three tables: stage j is at places[j] of the step, where the slopes of the stages
     # before it, times row j of `below`, lead; the slopes of all stages, times `weights`, make the step
     places, below, weights = rk4 if name == "RK4" else coefficients()[:3]
-    n, slopes = dynamics.positions, list[ca.SX]()
-    state, t, h = ca.SX.sym("state", 2 * n), ca.SX.sym("t"), ca.SX.sym("h")
+    slopes = list[ca.SX]()
+    state, t, h = ca.SX.sym("state", dynamics.positions + dynamics.freedom), ca.SX.sym("t"), ca.SX.sym("h")
     for place, row in zip(places, below, strict=True):
         at = state + h * weighted(row[: len(slopes)], slopes)
         slopes.append(_rate(dynamics, problem, t + float(place) * h, at))
@@ -209,8 +209,9 @@ def _explicit(name: str, dynamics: Dynamics, problem: TransferProblem) -> ca.Fun
 
 
 def _rate(dynamics: Dynamics, problem: TransferProblem, t: ca.SX, state: ca.SX) -> ca.SX:
-    n, no_force = dynamics.positions, ca.DM.zeros(dynamics.positions)
-    return ca.vertcat(state[n:], dynamics.acceleration(t, state[:n], state[n:], problem.mass, no_force))
+    q, w = ca.vertsplit(state, [0, dynamics.positions, dynamics.positions + dynamics.freedom])
+    change = dynamics.acceleration(t, q, w, problem.mass, ca.DM.zeros(dynamics.freedom))
+    return ca.vertcat(dynamics.configuration.velocity(q, w), change)
 
 
 def _adaptive(
@@ -245,7 +246,7 @@ def _adaptive(
 
 
 def _momenta(dynamics: Dynamics, t: np.ndarray, q: np.ndarray, v: np.ndarray, mass: float) -> np.ndarray:
-    return dynamics.point(t[None], q.T, v.T, mass)[1].full().T
+    return dynamics.momentum(t[None], q.T, v.T, mass).full().T
 
 
 def _energy_error(
