@@ -86,8 +86,8 @@ if TYPE_CHECKING:
     from dmoc.results.solution import load as load
     from dmoc.scene.conditions import Condition as Condition
     from dmoc.scene.ends import Boundary as Boundary
-    from dmoc.scene.ends import Moving as Moving
     from dmoc.scene.ends import State as State
+    from dmoc.scene.moving import Moving as Moving
     from dmoc.scene.orbits import CircularOrbit as CircularOrbit
     from dmoc.scene.orbits import Orbit as Orbit
     from dmoc.scene.poses import Attitude as Attitude

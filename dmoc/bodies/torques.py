@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, checked, limits, short, times_each
+from dmoc.basics.arguments import Vector, checked, limits, number, short, times_each
 from dmoc.basics.digits import up
 from dmoc.parts.actuator import Actuator
 
@@ -115,11 +115,14 @@ class Wrench(OnBody):
         Largest torque [N m], the same.
     frame : "body" or "space"
         The axes of the force; the torque is in body axes.
+    lever : float
+        The effort counts a torque as the force at this distance [m]: it integrates |F|^2 + |tau|^2 / lever^2.
     """
 
     most_force: float | Vector | None = None
     most_torque: float | Vector | None = None
     frame: str = "body"
+    lever: float = 1.0
     effort_unit: ClassVar[str] = "N^2 s"
 
     def __init__(
@@ -127,8 +130,10 @@ class Wrench(OnBody):
         force_limit: float | Vector | None = None,
         torque_limit: float | Vector | None = None,
         frame: str = "body",
+        lever: float = 1.0,
     ):
         checked(self, most_force=force_limit, most_torque=torque_limit, frame=frame)
+        checked(self, lever=number("lever", lever, "m", positive=True))
         if self.most_force is not None:
             checked(self, most_force=_three("Wrench: force limit", self.most_force, "N"))
         if self.most_torque is not None:
@@ -142,7 +147,7 @@ class Wrench(OnBody):
 
     @property
     def structure(self) -> tuple:
-        return type(self), self.frame
+        return type(self), self.frame, self.lever
 
     def size(self, dimension: int) -> int:
         return 2 * AXES
@@ -158,6 +163,9 @@ class Wrench(OnBody):
 
     def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
         return (u[:AXES] if self.frame == "space" else rotation @ u[:AXES]), u[AXES:]
+
+    def effort(self, u: Any) -> Any:
+        return ca.dot(u[:AXES], u[:AXES]) + ca.dot(u[AXES:], u[AXES:]) / self.lever**2
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         sides = [
@@ -178,7 +186,7 @@ class Wrench(OnBody):
             None if bound is None else times_each(bound, factor)
             for bound in (self.most_force, self.most_torque)
         )
-        return Wrench(force, torque, self.frame)
+        return Wrench(force, torque, self.frame, self.lever)
 
     @property
     def limit_words(self) -> str:
@@ -197,7 +205,7 @@ class Wrench(OnBody):
         return " and ".join(words)
 
     def unlimited(self) -> Actuator:
-        return Wrench(frame=self.frame)
+        return Wrench(frame=self.frame, lever=self.lever)
 
     def excess(self, u: np.ndarray) -> np.ndarray:
         _, upper = self.bounds(AXES)

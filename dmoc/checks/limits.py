@@ -106,7 +106,7 @@ def _row_excess(
 
 def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     """Zones and speed limits at the nodes and between them."""
-    scales = evidence.extent, evidence.speed
+    scales = evidence.extent, evidence.speed, evidence.begin
     for cut in cuts(evidence.problem.constraints, evidence.path, evidence.node_velocity, *scales):
         yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
     if evidence.path.attitudes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,8 +19,8 @@ SAME_WAY = 0.05
 def ways_past(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
     """Names and paths, each bent past one zone on one of its sides."""
     for i, constraint in enumerate(problem.constraints):
-        for way, bend in constraint.ways_round(base.position, base.fractions):
-            yield f"{way} of {type(constraint).__name__} {i + 1}", replace(base, position=base.position + bend)
+        for way, bend in constraint.ways_round(base.place, base.fractions):
+            yield f"{way} of {type(constraint).__name__} {i + 1}", base.moved(bend)
 
 
 def clear_ways(problem: TransferProblem, base: DiscretePath) -> list[DiscretePath]:
@@ -31,12 +30,12 @@ def clear_ways(problem: TransferProblem, base: DiscretePath) -> list[DiscretePat
     another path, on the nearer side.
     """
     found: list[tuple[bool, float, DiscretePath]] = []
-    extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0
+    extent = base.diagonal or 1.0
     for _, bent in ways_past(problem, base):
         for nearer in (False, True):
             path, clear = _past_the_others(problem, base, bent, nearer)
-            if all(np.abs(path.position - old.position).max() > SAME_WAY * extent for _, _, old in found):
-                length = float(np.linalg.norm(np.diff(path.position, axis=0), axis=1).sum())
+            if all(np.abs(path.place - old.place).max() > SAME_WAY * extent for _, _, old in found):
+                length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
                 found.append((not clear, length, path))
     return [path for _, _, path in sorted(found, key=lambda one: one[:2])]
 
@@ -45,14 +44,16 @@ def _past_the_others(
     problem: TransferProblem, base: DiscretePath, bent: DiscretePath, nearer: bool
 ) -> tuple[DiscretePath, bool]:
     """A bent path, bent again past the zones that it cuts, the deepest first; and whether it clears all."""
-    path, still = bent, np.zeros_like(bent.position)
-    for _ in range(BENDS_A_ZONE * len(problem.constraints)):
-        deep = [float(zone.excess(path.position, still).max()) for zone in problem.constraints]
-        bends = problem.constraints[int(np.argmax(deep))].ways_round(path.position, path.fractions)
+    path, still = bent, np.zeros_like(bent.place)
+    times = problem.start_time + base.duration * base.fractions
+    zones = [zone for zone in problem.constraints if not zone.turns_body]
+    for _ in range(BENDS_A_ZONE * len(zones)):
+        deep = [float(zone.excess_at(times, path.place, still).max()) for zone in zones]
+        bends = zones[int(np.argmax(deep))].ways_round(path.place, path.fractions)
         ways = [bend for _, bend in bends]
         if max(deep) <= 0 or not ways:
             return path, max(deep) <= 0
-        aside = path.position - base.position
+        aside = path.place - base.place
         worth = [-float(np.abs(bend).max()) if nearer else float((bend * aside).sum()) for bend in ways]
-        path = replace(path, position=path.position + ways[int(np.argmax(worth))])
+        path = path.moved(ways[int(np.argmax(worth))])
     return path, False

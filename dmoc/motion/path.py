@@ -95,6 +95,12 @@ class DiscretePath:
         """The coordinates that are places in space [m], shape (nodes, axes)."""
         return self.position[:, places_in(self.parts)] if self.blocks else self.position
 
+    def moved(self, bend: np.ndarray) -> DiscretePath:
+        """The path with its places moved by a bend, shape (nodes, axes) [m]."""
+        position = self.position.copy()
+        position[:, places_in(self.parts)] += bend
+        return replace(self, position=position)
+
     @property
     def attitudes(self) -> list[np.ndarray]:
         """The unit quaternions of each body that turns, shape (nodes, 4) each."""

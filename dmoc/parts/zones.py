@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, matching_length, number, same_length, short, vector
 from dmoc.basics.digits import down
+from dmoc.effects.user_functions import as_column
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import off_centre, ways_round
 from dmoc.parts.outline import Ball, Box, Cone, Shape
@@ -135,9 +136,9 @@ class ApproachCone(Constraint):
 
     Parameters
     ----------
-    apex : sequence of float
-        Tip of the cone [m].
-    axis : sequence of float
+    apex : sequence of float, or function of the time
+        Tip of the cone [m]. A function takes a CasADi time [s], as of a target that moves.
+    axis : sequence of float, or function of the time
         Direction from the tip into the cone [-]; made a unit vector.
     half_angle : float
         Between the axis and the surface [rad], less than pi/2.
@@ -145,40 +146,69 @@ class ApproachCone(Constraint):
         [m].
     """
 
-    apex: Vector
-    axis: Vector
+    # A vector, or a function of the time.
+    apex: Any
+    axis: Any
     half_angle: float
     rounding: float = 1e-6
-    adjustable: ClassVar[tuple[str, ...]] = ("apex", "axis", "half_angle", "rounding")
 
     def __post_init__(self) -> None:
-        apex, axis = vector("apex", self.apex, "m"), vector("axis", self.axis, "-")
-        same_length("ApproachCone", apex=apex, axis=axis)
-        length = float(np.linalg.norm(axis))
-        if len(axis) == 1 or length == 0:
+        apex, axis = self._at(ca.SX.sym("t")) if self.moves else (self.apex, self.axis)
+        if not self.moves:
+            apex, axis = vector("apex", self.apex, "m"), vector("axis", self.axis, "-")
+            same_length("ApproachCone", apex=apex, axis=axis)
+            length = float(np.linalg.norm(axis))
+            if len(axis) == 1 or length == 0:
+                raise ValueError(
+                    f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {short(self.axis)}"
+                )
+            checked(self, apex=apex, axis=tuple(x / length for x in axis))
+        elif not 2 <= apex.numel() == axis.numel() <= 3:
             raise ValueError(
-                f"ApproachCone: axis must be a direction in 2 or 3 dimensions; got {short(self.axis)}"
+                "ApproachCone: apex and axis must have the same 2 or 3 entries; "
+                f"got {apex.numel()} and {axis.numel()}"
             )
         half_angle = number("half_angle", self.half_angle, "rad", positive=True)
         if half_angle >= np.pi / 2:
             raise ValueError(f"ApproachCone: half_angle must be less than pi/2 rad; got {half_angle:g}")
         checked(
             self,
-            apex=apex,
-            axis=tuple(x / length for x in axis),
             half_angle=half_angle,
             rounding=number("rounding", self.rounding, "m", positive=True),
         )
 
+    @property
+    def moves(self) -> bool:
+        """Whether its apex or its axis is a function of the time."""
+        return callable(self.apex) or callable(self.axis)
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("half_angle", "rounding") if self.moves else ("apex", "axis", "half_angle", "rounding")
+
+    @property
+    def structure(self) -> tuple:
+        return (type(self), self.apex, self.axis) if self.moves else (type(self),)
+
+    def _at(self, t: Any) -> tuple[Any, Any]:
+        """Apex and unit axis at a time, for CasADi."""
+        apex, axis = (
+            ca.SX(as_column(part(t))) if callable(part) else ca.SX(ca.DM(part))
+            for part in (self.apex, self.axis)
+        )
+        return apex, axis / ca.sqrt(ca.dot(axis, axis))
+
     def check_dimension(self, dimension: int) -> None:
-        matching_length(self, "apex", len(self.apex), dimension)
+        size = self._at(ca.SX.sym("t"))[0].numel() if self.moves else len(self.apex)
+        matching_length(self, "apex", size, dimension)
 
     def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
-        offset = q - self.apex
-        depth = ca.dot(offset, self.axis)
+        apex, axis = self._at(t) if self.moves else (self.apex, self.axis)
+        offset = q - apex
+        depth = ca.dot(offset, axis)
         cos, sin = ca.cos(self.half_angle), ca.sin(self.half_angle)
         if q.shape[0] == 2:
-            side = cos * ca.det(ca.horzcat(ca.vertcat(self.axis[0], self.axis[1]), offset))
+            side = cos * ca.det(ca.horzcat(ca.vertcat(axis[0], axis[1]), offset))
             lines = {"left": sin * depth - side, "right": sin * depth + side}
             return [Row(name, inward, 0.0, np.inf, "m") for name, inward in lines.items()]
         # The rounding is taken off again, so that the tip itself, with a distance of 0 m, is allowed.
@@ -186,19 +216,31 @@ class ApproachCone(Constraint):
         return [Row("cone", depth - cos * distance, 0.0, np.inf, "m")]
 
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        offset = q - np.asarray(self.apex)
-        depth = offset @ np.asarray(self.axis)
-        aside = np.linalg.norm(offset - depth[:, None] * np.asarray(self.axis), axis=1)
+        return self.excess_at(np.zeros(len(q)), q, v)
+
+    def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        apex, axis = np.asarray(self.apex), np.asarray(self.axis)
+        if self.moves:
+            time = ca.SX.sym("t")
+            moved = ca.Function("cone", [time], list(map(ca.densify, self._at(time))))(t[None])
+            apex, axis = (part.full().T for part in moved)
+        offset = q - apex
+        depth = np.sum(offset * axis, axis=1)
+        aside = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
         # The distance from the surface is |d| sin(angle beyond it); behind the tip it is |d| itself.
         beyond = np.arctan2(aside, depth) - self.half_angle
         return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
 
     def words(self) -> str:
-        angle, axis = np.degrees(self.half_angle), _numbers(self.axis)
+        angle = np.degrees(self.half_angle)
+        if self.moves:
+            return f"stays in a cone of half angle {angle:g} degrees that moves"
+        axis = _numbers(self.axis)
         return f"stays in the cone of half angle {angle:g} degrees from {_place(self.apex)} along {axis}"
 
     def outline(self) -> tuple[Shape, ...]:
-        return (Cone(np.array(self.apex), np.array(self.axis), self.half_angle),)
+        # One that moves has no one place in a picture of the whole way.
+        return () if self.moves else (Cone(np.array(self.apex), np.array(self.axis), self.half_angle),)
 
 
 def _place(values: Vector) -> str:

@@ -55,7 +55,12 @@ class Cut:
 
 
 def cuts(
-    constraints: Sequence[Constraint], path: DiscretePath, velocity: np.ndarray, extent: float, speed: float
+    constraints: Sequence[Constraint],
+    path: DiscretePath,
+    velocity: np.ndarray,
+    extent: float,
+    speed: float,
+    start_time: float = 0.0,
 ) -> Iterator[Cut]:
     """Zones at the nodes and between them; a speed limit everywhere.
 
@@ -73,12 +78,17 @@ def cuts(
         dq/dt at every node, that of places in [m/s].
     extent, speed : float
         The scales of the path [m], [m/s].
+    start_time : float
+        [s], for zones that move.
     """
     if not constraints or not path.place.size:
         return
     velocity = velocity[:, places_in(path.parts)]
     longest = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).max())
     inside, chord, moving, straight = _inside_gaps(constraints, path, velocity, longest)
+    parts = (len(inside) - 1) // (len(path.position) - 1)
+    fractions = np.interp(np.arange(len(inside)) / parts, np.arange(len(path.position)), path.fractions)
+    times = start_time + path.duration * fractions
     bend = _most(np.linalg.norm(inside - chord, axis=1))
     sway = _most(np.linalg.norm(moving - straight, axis=1)) + 0.5 * _bump(path, velocity)
     still, none = np.zeros_like(inside), np.empty(0, int)
@@ -88,15 +98,17 @@ def cuts(
         name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
         if constraint.limits_speed:
             allowed = BOUND * speed + min(sway, DEEPEST * speed)
-            yield Cut(name, i, _most(constraint.excess(inside, moving)), allowed, "m/s", none)
+            yield Cut(name, i, _most(constraint.excess_at(times, inside, moving)), allowed, "m/s", none)
             continue
-        at_nodes = _most(constraint.excess(path.place, velocity))
+        at_nodes = _most(constraint.excess_at(times[::parts], path.place, velocity))
         yield Cut(f"{name} at nodes", i, at_nodes, BOUND * extent, unit, none)
         size = constraint.feature()
         # A zone that tells no size is judged by how deep the chords themselves cut into it.
-        depth = longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess(chord, still))
+        depth = (
+            longest**2 / (8 * size) if np.isfinite(size) else _most(constraint.excess_at(times, chord, still))
+        )
         allowed = BOUND * extent + min(depth + bend, DEEPEST * min(size, extent))
-        between = constraint.excess(inside, still)
+        between = constraint.excess_at(times, inside, still)
         yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, _steps(path, between > allowed))
 
 

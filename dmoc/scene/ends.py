@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
-import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import FreeVector, checked, entries, same_length, short, vector
-from dmoc.effects.user_functions import as_column, tried
+from dmoc.basics.arguments import FreeVector, checked, entries, same_length, vector
 from dmoc.parts.rows import Row
-
-# The remedy that is told where a function of time given to `Moving` cannot be used.
-OF_TIME = "it must take a CasADi time [s] and give 1 to 3 numbers: write it with casadi's functions"
 
 
 class Boundary(ABC):
@@ -159,82 +152,6 @@ class State(Boundary):
 
     def words(self) -> str:
         return f"position {_entries(self.position)} m, velocity {_entries(self.velocity)} m/s"
-
-
-@dataclass(frozen=True)
-class Moving(Boundary):
-    """A state that moves along a known path: the body is there at the time the transfer starts or ends.
-
-    Parameters
-    ----------
-    position : callable
-        Function of the time [s], a CasADi symbol, that gives the position [m], one entry an axis.
-    velocity : callable, "matched" or None
-        Function of the time that gives the velocity [m/s]; "matched" is the derivative of the
-        position, None leaves the velocity free (an interception).
-    """
-
-    position: Callable
-    velocity: Callable | str | None = "matched"
-
-    def __post_init__(self) -> None:
-        if not callable(self.position):
-            raise ValueError(
-                f"Moving: position must be a function of the time [s]; got {short(self.position)}; "
-                "use State(position, velocity) for what does not move"
-            )
-        word = self.velocity is None or (isinstance(self.velocity, str) and self.velocity == "matched")
-        if not (callable(self.velocity) or word):
-            raise ValueError(
-                f"Moving: velocity must be a function of the time [s], 'matched' or None; "
-                f"got {short(self.velocity)}"
-            )
-        for name in ("position",) if word else ("position", "velocity"):
-            tried(f"Moving: {name}", getattr(self, name), [ca.SX.sym("t")], OF_TIME)
-        sizes = [self._motion.numel_out(i) for i in range(self._motion.n_out())]
-        if not 1 <= sizes[0] <= 3 or len(set(sizes)) > 1:
-            raise ValueError(
-                "Moving: position and velocity must have the same 1 to 3 entries; "
-                f"got {sizes[0]} and {sizes[-1]}"
-            )
-
-    @cached_property
-    def _motion(self) -> ca.Function:
-        """t -> position [m] and, unless it is free, velocity [m/s]."""
-        t = ca.SX.sym("t")
-        position = ca.SX(as_column(self.position(t)))
-        if self.velocity is None:
-            return ca.Function("motion", [t], [position])
-        moving = as_column(self.velocity(t)) if callable(self.velocity) else ca.jacobian(position, t)
-        return ca.Function("motion", [t], [position, ca.densify(moving)])
-
-    @property
-    def dimension(self) -> int:
-        return self._motion.numel_out(0)
-
-    @property
-    def structure(self) -> tuple:
-        return type(self), self.position, self.velocity
-
-    @property
-    def anchored(self) -> bool:
-        return True
-
-    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
-        rows = []
-        for have, want, name, unit in zip(
-            (q, v), self._motion.call([t]), ("position", "velocity"), ("m", "m/s"), strict=False
-        ):
-            for i, axis in enumerate("xyz"[: self.dimension]):
-                rows.append(Row(f"{name}.{axis}", have[i] - want[i], 0.0, 0.0, unit))
-        return rows
-
-    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
-        position, *velocity = (np.array(ca.DM(value)).ravel() for value in self._motion.call([t]))
-        return position, velocity[0] if velocity else np.full(self.dimension, np.nan)
-
-    def words(self) -> str:
-        return f"a point that moves, with {'any velocity' if self.velocity is None else 'its velocity'}"
 
 
 def _entries(values: Any) -> str:

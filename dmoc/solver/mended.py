@@ -197,7 +197,11 @@ def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
     if not constraints or not rung.solved:
         return []
     path = rung.path
-    return [cut for cut in cuts(constraints, path, *_velocity(ladder, path)) if len(cut.steps)]
+    return [
+        cut
+        for cut in cuts(constraints, path, *_velocity(ladder, path), ladder.problem.start_time)
+        if len(cut.steps)
+    ]
 
 
 def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:

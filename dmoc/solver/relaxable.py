@@ -92,7 +92,7 @@ class Relaxable:
         coast, rows = replace(self.guess, control=0 * self.guess.control), nlp.rows["dynamics"]
         g = nlp.assembly.constraints(nlp.pack(coast), nlp.parameters(self.problem)).full().ravel()
         force = self.problem.mass * np.linalg.norm(rows.of(g) / rows.scales, axis=1).sum() / time
-        speed = np.linalg.norm(np.diff(coast.position, axis=0), axis=1).sum() / time
+        speed = np.linalg.norm(np.diff(coast.place, axis=0), axis=1).sum() / time
         limits = self.problem.actuator.force_limit(), self._largest_speed()
         return tuple(size / (limit or np.inf) for size, limit in zip((force, speed), limits, strict=True))
 
@@ -213,8 +213,8 @@ class Relaxable:
     def leaps(self, path: DiscretePath) -> bool:
         """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""
         inside = np.linspace(0, 1, 9)[1:-1, None, None]
-        chords = (1 - inside) * path.position[:-1] + inside * path.position[1:]
-        chords = chords.reshape(-1, path.position.shape[1])
+        chords = (1 - inside) * path.place[:-1] + inside * path.place[1:]
+        chords = chords.reshape(-1, path.place.shape[1])
         zones = [zone for zone in self.problem.constraints if np.isfinite(zone.feature())]
         return any((zone.excess(chords, chords) > LEAP * zone.feature()).any() for zone in zones)
 
