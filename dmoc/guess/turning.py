@@ -29,7 +29,7 @@ UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 # The guess of a turn in least time is bent off the axis of the turn by this angle [rad]: on the axis itself the
 # turn is stationary, and up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie, J. Guid. Control Dyn.
 # 16 (1993)).
-BENT = 0.3
+BENT = 0.6
 # A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
 LEISURE = 1.2
 
