@@ -1,12 +1,12 @@
 """The control that is flown between the nodes of a path.
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
-equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown, within
-the limit: the polynomial drawn towards its mean, which is right where a thrust at its limit turns; two constant
-pieces, for one switch; or the value of each node for as long as its weight, for more. Of these three each step
-has the one that keeps most of the control's first two moments about its middle, as they move the body. The limits
-are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse is flown that is not
-paid for.
+equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
+within the limit: the polynomial drawn towards its mean, which is right where a thrust at its limit turns; two
+constant pieces, for one switch; or the value of each node for as long as its weight, for more. Of these three
+each step has the one that keeps most of the control's first two moments about its middle, as they move the
+body. The limits are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse
+is flown that is not paid for.
 """
 
 from __future__ import annotations
