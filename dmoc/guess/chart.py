@@ -106,7 +106,7 @@ def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) 
     height = full @ normal
     level = full - height[:, None] * normal
     reach = np.linalg.norm(level, axis=1)
-    if (reach < LEAST_REACH * np.linalg.norm(full, axis=1)).any():
+    if (reach <= LEAST_REACH * np.linalg.norm(full, axis=1)).any():
         return None
     out = level / reach[:, None]
     along = np.cross(normal, out)

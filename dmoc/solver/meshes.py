@@ -22,7 +22,7 @@ DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
 # A transfer of many revolutions gets this many steps a revolution at each order. At order 2 that is multiplied
 # by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
 # goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
-A_TURN = {2: 150, 4: 40, 6: 20, 8: 8}
+A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
 # A transfer of many revolutions has this order if none is asked for.
 ORDER_OF_MANY_TURNS = 6
 # From this many revolutions on it has this order: over 97 of them in low orbit six steps of order 8 each miss
