@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.guess.chart import Chart
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
@@ -38,6 +39,7 @@ class Program:
     rows: Layout
     row_bounds: tuple[np.ndarray, np.ndarray]
     assembly: Assembly
+    chart: Chart | None = None
 
     def accepts(self, problem: TransferProblem) -> None:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from dmoc.basics.memory import remembered
+from dmoc.guess.chart import drafted
 from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
@@ -54,24 +55,27 @@ class Stencil:
     kernel: Kernel
     every: str
     unknowns: tuple[tuple[str, slice], ...]
-    numbers: tuple[str, ...]
+    numbers: tuple[tuple[str, slice], ...]
     targets: tuple[tuple[str, slice], ...]
     limits: tuple[Limit, ...]
 
 
-def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
-    """The stencils of a problem, written down once for all problems of the same structure."""
+def stencils_of(problem: TransferProblem, order: int, hold: bool, curved: bool = False) -> Stencils:
+    """The stencils of a problem, written down once for all problems of the same structure.
+
+    If `curved`, in the unknowns of a `Chart`.
+    """
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [type(constraint) for constraint in problem.constraints]
-    shape = problem.dimension, problem.free_duration, order, hold
-    make = partial(_written, problem, scheme(order), hold)
+    shape = problem.dimension, problem.free_duration, order, hold, curved
+    make = partial(_written, problem, scheme(order), hold, curved)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
-def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Stencils:
-    writer = _Writer(problem, rule, hold)
+def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool) -> Stencils:
+    writer = _Writer(problem, rule, hold, curved)
     return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
 
 
@@ -86,8 +90,8 @@ class Stencils:
 class _Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
-    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
-        self.problem, self.rule, self.hold = problem, rule, hold
+    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool):
+        self.problem, self.rule, self.hold, self.curved = problem, rule, hold, curved
         self.dynamics = Dynamics.of(problem)
         self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
@@ -102,8 +106,8 @@ class _Writer:
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
         draft, n = _Draft(self), self.dynamics.positions
-        r = draft.take("position", n)
-        u = None if self.hold else draft.take("force", self.dynamics.controls)
+        r, frame = draft.place()
+        u = None if self.hold else draft.control(frame)
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = self.start_time + fraction * duration, r + self.origin
@@ -113,7 +117,7 @@ class _Writer:
             t, q, ca.DM.zeros(n), m
         )
         push = push if u is None else push + self.actuator.force(u) / m
-        draft.add("dynamics", duration * weight * (dldq + push))
+        draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)))
         for i, constraint in enumerate(self.constraints):
             draft.limit(title(constraint, i), "node", constraint.rows(t, q, u, m), Owner("constraints", i))
         if u is not None:
@@ -128,7 +132,7 @@ class _Writer:
         draft, size = _Draft(self), self.dynamics.controls
         # nodes[j] picks the j-th node of every step out of all steps * s + 1 nodes.
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
-        r = [draft.take("position", n, at) for at in nodes]
+        r, frames = map(list, zip(*(draft.place(at) for at in nodes), strict=True))
         duration, costly = draft.duration(), self._cost_in_steps() or problem.actuator.burns
         begin, length = draft.number("begin"), draft.number("length")
         h, m = length * duration, [draft.mass(at) for at in nodes]
@@ -136,7 +140,7 @@ class _Writer:
         if self.hold:
             u = [draft.take("force", size)] * (rule.degree + 1)
         elif costly:
-            u = [draft.take("force", size, at) for at in nodes]
+            u = [draft.control(frame, at) for frame, at in zip(frames, nodes, strict=True)]
         push = [self.actuator.force(u[0]) / mass if self.hold else 0 for mass in m]
         moving = point_function(split_effects(problem.effects, n)[1], self.dynamics.configuration)
         t0 = self.start_time + begin * duration
@@ -144,8 +148,9 @@ class _Writer:
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
 
-        for momentum, at in zip(step_momenta(rule, point, t0, h, r, m, push), nodes, strict=True):
-            draft.add("dynamics", momentum, at)
+        momenta = step_momenta(rule, point, t0, h, r, m, push)
+        for momentum, frame, at in zip(momenta, frames, nodes, strict=True):
+            draft.add("dynamics", frame.T @ momentum, at)
         moves = [position - r[0] for position in r[1:]]
         for i, constraint in enumerate(self.constraints):
             at_gauss = [weighted(row[1:], moves) / h for row in rule.slopes_at(rule.gauss_points())]
@@ -197,16 +202,18 @@ class _Writer:
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
-        draft, n = _Draft(self), self.dynamics.positions
-        first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
-        v = {end: draft.take(f"{end}.velocity", self.dynamics.freedom) for end in ("start", "goal")}
+        draft = _Draft(self)
+        (first, before), (last, after) = (draft.place(at) for at in (FIRST, LAST))
+        first, last = first + self.origin, last + self.origin
+        frames = (("start", before), ("goal", after))
+        v = {end: frame @ draft.take(f"{end}.velocity", self.dynamics.freedom) for end, frame in frames}
         start_time, goal_time = self.start_time, self.start_time + draft.duration()
         states = {
             "start": (start_time, first, v["start"], draft.mass(FIRST)),
             "goal": (goal_time, last, v["goal"], draft.mass(LAST)),
         }
-        draft.add("dynamics", self.dynamics.point(*states["start"])[1], FIRST)
-        draft.add("dynamics", -self.dynamics.point(*states["goal"])[1], LAST)
+        draft.add("dynamics", before.T @ self.dynamics.point(*states["start"])[1], FIRST)
+        draft.add("dynamics", -after.T @ self.dynamics.point(*states["goal"])[1], LAST)
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
             speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows(v[end]))]
@@ -235,7 +242,7 @@ class _Draft:
         self._symbols: list[ca.SX] = []
         self._unknowns: list[tuple[str, slice]] = []
         self._data: list[ca.SX] = []
-        self._numbers: list[str] = []
+        self._numbers: list[tuple[str, slice]] = []
         self._rows: list[ca.SX] = []
         self._targets: list[tuple[str, slice]] = []
         self._limits: list[Limit] = []
@@ -246,10 +253,23 @@ class _Draft:
         self._unknowns.append((group, at))
         return self._symbols[-1]
 
-    def number(self, name: str) -> ca.SX:
-        """A symbol for a number that the mesh gives to each evaluation."""
+    def place(self, at: slice = ALL) -> tuple[Any, Any]:
+        """The position of a node from the origin, and the frame that forces and rows of motion have there."""
+        n = self.writer.dynamics.positions
+        unknowns = self.take("position", n, at)
+        if not self.writer.curved:
+            return unknowns, ca.DM.eye(n)
+        return drafted(lambda name: self.number(name, at), unknowns)
+
+    def control(self, frame: Any, at: slice = ALL) -> ca.SX:
+        """The controls of a node, whose force is in the frame there."""
+        u, n = self.take("force", self.writer.dynamics.controls, at), self.writer.dynamics.positions
+        return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved else u
+
+    def number(self, name: str, at: slice = ALL) -> ca.SX:
+        """A symbol for a number that the mesh, or the chart, gives to each evaluation."""
         self._data.append(ca.SX.sym(name))
-        self._numbers.append(name)
+        self._numbers.append((name, at))
         return self._data[-1]
 
     def mass(self, at: slice) -> ca.SX:
