@@ -134,8 +134,9 @@ def _least_effort(
     attractor, start = problem.attraction.lone, problem.start.fixed()
     # Only where the controls are the force, or the force and its magnitude, are they known from the force.
     more = problem.actuator.labels(problem.dimension)[problem.dimension :]
-    free = problem.goal.anchored or np.isnan(start).any()
-    if attractor is None or problem.constraints or free or more not in ((), ("throttle",)):
+    # Shots see the conditions of the goal, not numbers that it fixes.
+    other = problem.goal.anchored or np.isnan(start).any() or not np.isnan(problem.goal.fixed()).all()
+    if attractor is None or problem.constraints or other or more not in ((), ("throttle",)):
         return None
     if duration * problem.attraction.rates(start[0][None])[0] < 2 * np.pi * VERY_MANY_TURNS:
         return None

@@ -1,11 +1,12 @@
 """The control that is flown between the nodes of a path.
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
-equations. Where the polynomial breaks the actuator's limit, as it does where the control switches inside the
-step, two constant pieces of the same impulse are flown there, within the limit. Of all such pieces, those keep
-the most of the control's first moment about the middle of the step. The limits are convex sets: the mean of the
-node values with the scheme's weights, which keeps none of it, obeys them. No impulse is flown that is not
-paid for.
+equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
+within the limit: the polynomial drawn towards its mean, which is right where a thrust at its limit turns; two
+constant pieces, for one switch; or the value of each node for as long as its weight, for more. Of these three
+each step has the one that keeps most of the control's first two moments about its middle, as they move the
+body. The limits are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse
+is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -89,30 +90,77 @@ def _beyond(dynamics: Dynamics, controls: np.ndarray) -> np.ndarray:
 def _mended(
     dynamics: Dynamics, rule: Scheme, path: DiscretePath, nodes: np.ndarray, broken: np.ndarray
 ) -> Flown:
-    """The same impulse within the limit in the steps whose polynomial breaks it."""
-    mean = np.einsum("j,jkn->kn", rule.weights, nodes[:, broken])
-    moment = np.einsum("j,jkn->kn", rule.weights * (rule.points - 0.5), nodes[:, broken])
+    """The same impulse within the limit in the steps whose polynomial breaks it, by the best way for each."""
+    values, kept = nodes[:, broken], ~broken
+    ways = [
+        _drawn_in(dynamics, rule, values),
+        _two_pieces(dynamics, rule, values),
+        _node_pieces(dynamics, rule, values),
+    ]
+    whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
+    wanted = _moments(rule, whole, values[:, None])
+    best = np.argmin([np.abs(_moments(rule, *way) - wanted).sum(axis=(0, 2)) for way in ways], axis=0)
+    begins, found = [path.mesh[:-1][kept]], [nodes[:, kept]]
+    first, length = path.mesh[:-1][broken], np.diff(path.mesh)[broken]
+    for number, (bounds, pieces) in enumerate(ways):
+        mine = best == number
+        begins.append((first[mine] + bounds[mine, :-1].T * length[mine]).ravel())
+        found.append(pieces[:, :, mine].reshape(len(pieces), -1, pieces.shape[-1]))
+    order = np.argsort(np.concatenate(begins), kind="stable")
+    mesh = np.append(np.concatenate(begins)[order], path.mesh[-1])
+    return Flown(mesh, np.concatenate(found, axis=1)[:, order], broken)
+
+
+def _moments(rule: Scheme, bounds: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+    """First and second moment of controls about the middle of a step, shape (2, steps, size).
+
+    Of pieces with these `bounds`, fractions of shape (steps, pieces + 1), that are polynomials through values
+    of shape (s+1, pieces, steps, size). Exact but for the second moment at order 4, to the scheme's degree.
+    """
+    lengths = np.diff(bounds).T
+    places = bounds[:, :-1].T + rule.points[:, None, None] * lengths - 0.5
+    powers = np.stack([places, places**2])
+    return np.einsum("j,kn,ajkn,jkns->ans", rule.weights, lengths, powers, pieces)
+
+
+def _drawn_in(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The polynomial drawn towards its mean until it keeps the limit: nearly all of it where a thrust turns."""
+    mean = np.einsum("j,jkn->kn", rule.weights, values)
+    apart = np.einsum("pj,jkn->pkn", rule.values_at(LOOKED_AT), values) - mean
+    share = _share_within(dynamics, mean, apart[:, None])[0]
+    bounds = np.broadcast_to([0.0, 1.0], (len(mean), 2))
+    return bounds, (mean + share[:, None] * (values - mean))[:, None]
+
+
+def _two_pieces(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two constant pieces that keep the first moment, or as much of it as the limit lets them: one switch."""
+    mean = np.einsum("j,jkn->kn", rule.weights, values)
+    moment = np.einsum("j,jkn->kn", rule.weights * (rule.points - 0.5), values)
     # Pieces that meet at tau have the mean m and the first moment d about the middle of the step if they are
     # m - 2d/tau and m + 2d/(1 - tau).
     meeting = MEETINGS[:, None, None]
     apart = np.stack([-2 * moment / meeting, 2 * moment / (1 - meeting)])
     share = _share_within(dynamics, mean, apart)
-    best = np.argmax(share, axis=0)
-    every = np.arange(len(mean))
-    first, second = mean + share[best, every][:, None] * apart[:, best, every]
-    step = np.repeat(np.arange(len(broken)), 1 + broken)
-    seconds = np.flatnonzero(broken) + np.arange(1, 1 + broken.sum())
-    found = nodes[:, step].copy()
-    found[:, seconds - 1], found[:, seconds] = first, second
-    ends = path.mesh[step]
-    ends[seconds] += MEETINGS[best] * np.diff(path.mesh)[broken]
-    return Flown(np.append(ends, path.mesh[-1]), found, broken)
+    best, every = np.argmax(share, axis=0), np.arange(len(mean))
+    pieces = mean + share[best, every][:, None] * apart[:, best, every]
+    bounds = np.stack([np.zeros(len(mean)), MEETINGS[best], np.ones(len(mean))], axis=1)
+    return bounds, np.broadcast_to(pieces, (len(values), *pieces.shape))
+
+
+def _node_pieces(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The value of each node, held for as long as its weight: a coast that begins and ends within the step."""
+    mean = np.einsum("j,jkn->kn", rule.weights, values)
+    pieces = mean + _share_within(dynamics, mean, (values - mean)[:, None])[0][:, None] * (values - mean)
+    bounds = np.append(0.0, np.cumsum(rule.weights))
+    bounds[-1] = 1.0
+    bounds = np.broadcast_to(bounds, (values.shape[1], len(bounds)))
+    return bounds, np.broadcast_to(pieces, (len(values), *values.shape))
 
 
 def _share_within(dynamics: Dynamics, mean: np.ndarray, apart: np.ndarray) -> np.ndarray:
     """The largest part of `apart`, at most 1, by which controls can leave their mean within the limit.
 
-    Shape of `apart` (2, meetings, steps, size), of the result (meetings, steps). Limits are convex, so that
+    Shape of `apart` (places, ways, steps, size), of the result (ways, steps). Limits are convex, so that
     bisection finds it.
     """
     allowed = BREAKS * (dynamics.actuator.main_limit() or 0.0)

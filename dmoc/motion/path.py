@@ -87,7 +87,7 @@ class DiscretePath:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The sizes of the parts of q in turn."""
+        """The sizes of the parts of q."""
         return self.blocks or self.position.shape[1:]
 
     @property
@@ -252,10 +252,7 @@ def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray
 
 @dataclass(frozen=True)
 class Scales:
-    """The sizes that errors of a path are judged by.
-
-    `extent` [m] and `speed` [m/s] belong to places, `turn` [rad] and `rate` [rad/s] to attitudes.
-    """
+    """Sizes for errors of a path: [m] and [m/s] of places, [rad] and [rad/s] of attitudes."""
 
     extent: float
     speed: float

@@ -9,6 +9,13 @@ import numpy as np
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.scene.problem import TransferProblem
 
+# Rounding loosens the tolerance to this at most [-]: at 2e-8 the costates of 140 revolutions are 3e-5 of the
+# largest off, at 5e-9 1e-6.
+LOOSEST = 5e-9
+# Over very many revolutions propellant hardly depends on where it is burnt: the barrier begins with this
+# parameter [-], at which that little counts. From 1e-6 or 1e-4 on it takes 45 iterations, not 25.
+FLAT = 1e-9
+
 
 def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:
     """Ipopt's tolerance for scaled rows and gradients [-].
@@ -21,16 +28,22 @@ def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) 
     """
     floor = 20 * np.finfo(float).eps * degree / np.diff(mesh).min()
     if turns > VERY_MANY_TURNS:
-        floor *= 2 * np.pi * turns
+        floor = max(floor, min(floor * 2 * np.pi * turns, LOOSEST))
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
 
 
 def settings_for(
-    problem: TransferProblem, mesh: np.ndarray, degree: int, warm: bool = False, carried: bool = False
+    problem: TransferProblem,
+    mesh: np.ndarray,
+    degree: int,
+    warm: bool = False,
+    carried: bool = False,
+    curved: bool = False,
 ) -> dict[str, Any]:
     """Options of Ipopt for a problem on a mesh.
 
-    `warm` if multipliers are known, `carried` if they and the path come from the answer on a coarser mesh.
+    `warm` if multipliers are known, `carried` if they and the path come from the answer on a coarser mesh,
+    `curved` if the unknowns are those of a chart.
     """
     settings: dict[str, Any] = {
         # Limits are kept as they are given: Ipopt would loosen them by 1e-8.
@@ -45,22 +58,30 @@ def settings_for(
         "ipopt.acceptable_obj_change_tol": 1e-10,
         "ipopt.max_iter": 1000,
     }
-    if problem.limited:
+    if curved:
+        # Over very many revolutions the steps must be more exact: with MUMPS' other orderings, or without its
+        # matching, errors look like negative curvature, and 64 iterations were taken instead of two.
+        settings["ipopt.mumps_pivot_order"] = 5
+        # With MUMPS' own choice of scaling pivots are delayed: 48 s went into one iteration on 970 steps, and
+        # with rows and columns scaled in turn 8 s into all 24.
+        settings["ipopt.mumps_scaling"] = 8
+    elif problem.limited:
         # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
         settings["ipopt.mumps_permuting_scaling"] = 0
         if len(mesh) > 1000:
             settings["ipopt.mumps_pivot_order"] = 5
-    settings |= _barrier(problem, warm, carried)
+    settings |= {} if curved else _barrier(problem, warm, carried)
     if (
         problem.limited
         and not warm
-        and problem.actuator.smoothing is None
+        and (curved or problem.actuator.smoothing is None)
         and _turns(problem) > VERY_MANY_TURNS
     ):
         # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions,
         # and over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
         near = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mu_init")
-        settings |= {f"ipopt.{name}": 1e-6 for name in near}
+        size = FLAT if curved and problem.objective.metered else 1e-6
+        settings |= {f"ipopt.{name}": size for name in near}
     if warm:
         # Values interpolated from a coarser mesh break the equations: from 1e-8 away from a limit the first
         # steps would be cut short. A distance of 1e-3 takes 1,173 iterations, not 1,309, on the last meshes of

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.guess.chart import Chart
 from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.layout import Layout, Limit
-from dmoc.nlp.stencils import Stencil, Stencils
+from dmoc.nlp.layout import Layout, Limit, Stencil, Stencils
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
@@ -30,6 +30,7 @@ class Placement:
         hold: bool,
         mesh: np.ndarray,
         units: Units,
+        chart: Chart | None = None,
     ):
         self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
         self.dynamics = Dynamics.of(problem)
@@ -51,7 +52,7 @@ class Placement:
             "weight": node_weights(mesh, rule),
             "begin": mesh[:-1],
             "length": np.diff(mesh),
-        }
+        } | (chart.numbers() if chart else {})
         self.blocks = [self._block(stencil, numbers) for stencil in stencils.stencils]
 
     @property
@@ -95,7 +96,7 @@ class Placement:
             found = [layout[group].indices[:, at] for group, at in places]
             return np.vstack([np.broadcast_to(each, (len(each), count)) for each in found])
 
-        values = [numbers[name] for name in stencil.numbers]
+        values = [numbers[name][at] for name, at in stencil.numbers]
         return Block(
             stencil.kernel,
             stacked(self.columns, stencil.unknowns),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.guess.chart import Chart
 from dmoc.motion.configuration import configuration_of, places_in, quaternions_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
@@ -39,6 +40,7 @@ class Program:
     rows: Layout
     row_bounds: tuple[np.ndarray, np.ndarray]
     assembly: Assembly
+    chart: Chart | None = None
 
     def accepts(self, problem: TransferProblem) -> None:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""

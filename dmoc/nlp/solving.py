@@ -17,6 +17,7 @@ from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
 from dmoc.nlp.ipopt_options import settings_for
+from dmoc.nlp.layout import Curved
 from dmoc.nlp.program import Program
 from dmoc.results.facts import Level, Provenance
 from dmoc.results.solution import Solution, reported
@@ -44,13 +45,17 @@ class NLP(Program):
         watch: Watch | None = None,
     ) -> ca.Function:
         """Ipopt for this NLP; `warm` and `carried` as in `settings_for`."""
-        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried)
+        curved = self.chart is not None
+        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried, curved)
         return make_solver(self.assembly, settings, options, watch)
 
     def watch(self, problem: TransferProblem, progress: Progress | None, interrupt: Interrupt) -> Watch:
         """A watch over the iterations that tells `progress` of each in the problem's own words."""
 
         def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
+            if (curved := self.curved) is not None:
+                # Each row of motion stands for the same share of the same node in both.
+                x = curved.path(x.ravel())
             worst = self.violations(problem, x, g, count=1)
             name, size = (worst[0][0].name_of(worst[0][1]), worst[0][2]) if worst else ("", 0.0)
             steps = len(self.mesh) - 1
@@ -71,9 +76,19 @@ class NLP(Program):
             place = self.columns["duration"].start
             lbx[place] = ubx[place] = self.pack(path)[place]
         lam_x, lam_g = self.multipliers(path)
+        x0, curved = np.clip(self.pack(path), lbx, ubx), self.curved
+        if curved is not None:
+            lam_x, lam_g = curved.multipliers(x0, lam_x, lam_g)
+            x0, fixed = curved.unknowns(x0), lbx == ubx
+            lbx, ubx = np.where(fixed, x0, lbx), np.where(fixed, x0, ubx)
         bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
-        x0 = np.clip(self.pack(path), lbx, ubx)
-        return run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
+        found = run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
+        return found if curved is None else curved.answer(found)
+
+    @property
+    def curved(self) -> Curved | None:
+        """The way to the unknowns of Ipopt and back, where these are not those of the path."""
+        return Curved(self.chart, self.columns, self.rows) if self.chart else None
 
     def level(self, answer: Answer, build_s: float) -> Level:
         """One run as a level of the ladder: its mesh, iterations, times and status."""

@@ -10,20 +10,20 @@ serves every mesh, and every problem of the same structure.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.memory import remembered
+from dmoc.guess.chart import drafted
 from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics, actuation, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
-from dmoc.nlp.assembly import Kernel, kernel
-from dmoc.nlp.layout import CONSTRAINT, Limit, Owner
+from dmoc.nlp.assembly import kernel
+from dmoc.nlp.layout import CONSTRAINT, Limit, Owner, Stencil, Stencils
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
@@ -35,51 +35,30 @@ FIRST = slice(0, 1)
 LAST = slice(-1, None)
 
 
-@dataclass(frozen=True)
-class Stencil:
-    """A kernel, and where its unknowns and rows stand on any mesh: (group, which of its entries).
+def stencils_of(problem: TransferProblem, order: int, hold: bool, curved: bool = False) -> Stencils:
+    """The stencils of a problem, written down once for all problems of the same structure.
 
-    It is evaluated at `every` "node", "step" or at both "ends" once; `limits` are the groups of
-    rows that nothing else adds to.
+    If `curved`, in the unknowns of a `Chart`.
     """
-
-    kernel: Kernel
-    every: str
-    unknowns: tuple[tuple[str, slice], ...]
-    numbers: tuple[str, ...]
-    targets: tuple[tuple[str, slice], ...]
-    limits: tuple[Limit, ...]
-
-
-def stencils_of(problem: TransferProblem, order: int, hold: bool) -> Stencils:
-    """The stencils of a problem, written down once for all problems of the same structure."""
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [(type(constraint), getattr(constraint, "structure", None)) for constraint in problem.constraints]
-    shape = configuration_of(problem), problem.free_duration, order, hold
-    make = partial(_written, problem, scheme(order), hold)
+    shape = configuration_of(problem), problem.free_duration, order, hold, curved
+    make = partial(_written, problem, scheme(order), hold, curved)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
-def _written(problem: TransferProblem, rule: Scheme, hold: bool) -> Stencils:
-    writer = _Writer(problem, rule, hold)
+def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool) -> Stencils:
+    writer = _Writer(problem, rule, hold, curved)
     return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
-
-
-@dataclass(frozen=True)
-class Stencils:
-    """The stencils of one structure of problem at one order, and how many parameters they have."""
-
-    stencils: tuple[Stencil, ...]
-    parameter_count: int
 
 
 class _Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
-    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool):
-        self.problem, self.rule, self.hold = problem, rule, hold
+    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool):
+        self.problem, self.rule, self.hold, self.curved = problem, rule, hold, curved
         self.dynamics = Dynamics.of(problem)
         self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
@@ -94,8 +73,8 @@ class _Writer:
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
         draft, n, body = _Draft(self), self.dynamics.positions, self.dynamics.configuration
-        r = draft.take("position", n)
-        u = None if self.hold else draft.take("force", self.dynamics.controls)
+        r, frame = draft.place()
+        u = None if self.hold else draft.control(frame)
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = self.start_time + fraction * duration, r + self.origin
@@ -105,7 +84,7 @@ class _Writer:
         push = push if u is None else push + actuation(body, self.actuator, q, u) / m
         if body.surplus:
             push = push - body.pull(q, draft.take("reaction", body.surplus))
-        draft.add("dynamics", duration * weight * (dldq + push))
+        draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)))
         if body.surplus:
             rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q)))]
             draft.limit(CONSTRAINT, "node", rows)
@@ -120,11 +99,11 @@ class _Writer:
 
     def step(self) -> Stencil:
         """Momenta of one step; cost and limits that look at its velocities or at a held control."""
-        rule, problem, n = self.rule, self.problem, self.dynamics.positions
+        rule, problem = self.rule, self.problem
         draft, size = _Draft(self), self.dynamics.controls
         # nodes[j] picks the j-th node of every step out of all steps * s + 1 nodes.
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
-        r = [draft.take("position", n, at) for at in nodes]
+        r, frames = map(list, zip(*(draft.place(at) for at in nodes), strict=True))
         duration, costly = draft.duration(), self._cost_in_steps() or problem.actuator.burns
         begin, length = draft.number("begin"), draft.number("length")
         h, m = length * duration, [draft.mass(at) for at in nodes]
@@ -132,7 +111,7 @@ class _Writer:
         if self.hold:
             u = [draft.take("force", size)] * (rule.degree + 1)
         elif costly:
-            u = [draft.take("force", size, at) for at in nodes]
+            u = [draft.control(frame, at) for frame, at in zip(frames, nodes, strict=True)]
         body = self.dynamics.configuration
         push = [
             actuation(body, self.actuator, place + self.origin, u[0]) / mass if self.hold else 0
@@ -144,8 +123,9 @@ class _Writer:
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
 
-        for momentum, at in zip(step_momenta(rule, point, t0, h, r, m, push, body.blocks), nodes, strict=True):
-            draft.add("dynamics", momentum, at)
+        momenta = step_momenta(rule, point, t0, h, r, m, push, body.blocks)
+        for momentum, frame, at in zip(momenta, frames, nodes, strict=True):
+            draft.add("dynamics", frame.T @ momentum, at)
         moves = [position - r[0] for position in r[1:]]
         for i, constraint in enumerate(self.constraints):
             at_gauss = [weighted(row[1:], moves) / h for row in rule.slopes_at(rule.gauss_points())]
@@ -206,16 +186,18 @@ class _Writer:
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
-        draft, n, body = _Draft(self), self.dynamics.positions, self.dynamics.configuration
-        first, last = (draft.take("position", n, at) + self.origin for at in (FIRST, LAST))
-        v = {end: draft.take(f"{end}.velocity", self.dynamics.freedom) for end in ("start", "goal")}
+        draft, body = _Draft(self), self.dynamics.configuration
+        (first, before), (last, after) = (draft.place(at) for at in (FIRST, LAST))
+        first, last = first + self.origin, last + self.origin
+        v = {end: draft.velocity(end, frame) for end, frame in (("start", before), ("goal", after))}
         start_time, goal_time = self.start_time, self.start_time + draft.duration()
         states = {
             "start": (start_time, first, v["start"], draft.mass(FIRST)),
             "goal": (goal_time, last, v["goal"], draft.mass(LAST)),
         }
-        for (t, q, w, m), sign, at in ((states["start"], 1, FIRST), (states["goal"], -1, LAST)):
-            draft.add("dynamics", sign * self.dynamics.point(t, q, body.velocity(q, w), m)[1], at)
+        for name, frame, at in (("start", before.T, FIRST), ("goal", -after.T, LAST)):
+            t, q, w, m = states[name]
+            draft.add("dynamics", frame @ self.dynamics.point(t, q, body.velocity(q, w), m)[1], at)
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
             _, q, w, _ = states[end]
@@ -255,7 +237,7 @@ class _Draft:
         self._symbols: list[ca.SX] = []
         self._unknowns: list[tuple[str, slice]] = []
         self._data: list[ca.SX] = []
-        self._numbers: list[str] = []
+        self._numbers: list[tuple[str, slice]] = []
         self._rows: list[ca.SX] = []
         self._targets: list[tuple[str, slice]] = []
         self._limits: list[Limit] = []
@@ -266,10 +248,28 @@ class _Draft:
         self._unknowns.append((group, at))
         return self._symbols[-1]
 
-    def number(self, name: str) -> ca.SX:
-        """A symbol for a number that the mesh gives to each evaluation."""
+    def place(self, at: slice = ALL) -> tuple[Any, Any]:
+        """The position of a node from the origin, and the frame that forces and rows of motion have there."""
+        n = self.writer.dynamics.positions
+        unknowns = self.take("position", n, at)
+        if not self.writer.curved:
+            return unknowns, ca.DM.eye(n)
+        return drafted(lambda name: self.number(name, at), unknowns)
+
+    def control(self, frame: Any, at: slice = ALL) -> ca.SX:
+        """The controls of a node, whose force is in the frame there."""
+        u, n = self.take("force", self.writer.dynamics.controls, at), self.writer.dynamics.positions
+        return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved else u
+
+    def velocity(self, end: str, frame: Any) -> ca.SX:
+        """The velocity at one end, which is in the frame there."""
+        v = self.take(f"{end}.velocity", self.writer.dynamics.freedom)
+        return frame @ v if self.writer.curved else v
+
+    def number(self, name: str, at: slice = ALL) -> ca.SX:
+        """A symbol for a number that the mesh, or the chart, gives to each evaluation."""
         self._data.append(ca.SX.sym(name))
-        self._numbers.append(name)
+        self._numbers.append((name, at))
         return self._data[-1]
 
     def mass(self, at: slice) -> ca.SX:

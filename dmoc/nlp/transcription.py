@@ -9,15 +9,17 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, flag, number, of_kind, short, whole
 from dmoc.basics.memory import Shelf
+from dmoc.guess.chart import Chart
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import assemble
+from dmoc.nlp.layout import Stencils
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.solving import NLP
-from dmoc.nlp.stencils import Stencils, stencils_of
+from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
 
@@ -62,13 +64,19 @@ def transcribe(
     return transcribe_onto(problem, start, units_of(problem, start))
 
 
-def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units, compiled: bool = False) -> NLP:
+def transcribe_onto(
+    problem: TransferProblem,
+    guess: DiscretePath,
+    units: Units,
+    compiled: bool = False,
+    chart: Chart | None = None,
+) -> NLP:
     """The NLP on the mesh, order and kind of control of a guess.
 
     An NLP that is held serves again for a problem of the same structure, on the same mesh and in the same
-    units.
+    units; not one with a `chart`, whose unknowns are counted from the path that it was made for.
     """
-    stencils = stencils_of(problem, guess.order, guess.hold)
+    stencils = stencils_of(problem, guess.order, guess.hold, chart is not None)
     mesh, sizes = (
         guess.mesh.tobytes(),
         np.concatenate([*astuple(units)[:-1], units.origin], axis=None).tobytes(),
@@ -78,9 +86,9 @@ def transcribe_onto(problem: TransferProblem, guess: DiscretePath, units: Units,
 
     def make() -> tuple[Stencils, NLP]:
         # The stencils are held with the NLP: once they were gone, another object might get their identity.
-        return stencils, _transcribed(problem, stencils, guess, units, compiled, dynamics)
+        return stencils, _transcribed(problem, stencils, guess, units, compiled, dynamics, chart)
 
-    small = len(guess.position) <= MOST_HELD_NODES
+    small = chart is None and len(guess.position) <= MOST_HELD_NODES
     _, nlp = _NLPS.get(key, make) if small else make()
     return replace(nlp, problem=problem, dynamics=dynamics)
 
@@ -92,14 +100,15 @@ def _transcribed(
     units: Units,
     compiled: bool,
     dynamics: Dynamics,
+    chart: Chart | None,
 ) -> NLP:
     rule = scheme(guess.order)
-    placed = Placement(problem, stencils, rule, guess.hold, guess.mesh, units)
+    placed = Placement(problem, stencils, rule, guess.hold, guess.mesh, units, chart)
     columns, rows = placed.columns, placed.rows
     scales = columns.scales(), rows.scales(), 1 / units.cost
     assembly = assemble(placed.blocks, *scales, stencils.parameter_count, compiled)
     numbers = units, columns, rows, placed.row_bounds, assembly
-    return NLP(problem, dynamics, rule, guess.hold, guess.mesh, *numbers)
+    return NLP(problem, dynamics, rule, guess.hold, guess.mesh, *numbers, chart=chart)
 
 
 def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:

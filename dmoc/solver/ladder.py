@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube, out_of_tube
 from dmoc.motion.dynamics import Dynamics
@@ -84,7 +85,10 @@ class Ladder:
         if first.multipliers:
             return self._explained(self.solve_on(first), first, None, None)
         cause = None
-        for mesh, rounding in rounding_stages(meshes, self.problem.actuator.smoothing):
+        curved = is_curved(self.problem, first)
+        # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
+        stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
+        for mesh, rounding in stages:
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
@@ -198,7 +202,8 @@ class Ladder:
             if warm.solved or warm.stopped:
                 return warm
             guess = replace(guess, multipliers={})
-        near = in_tube(problem, guess)
+        # In the unknowns of a chart Ipopt does not leave the guess for other revolutions.
+        near = None if is_curved(problem, guess) else in_tube(problem, guess)
         if near is not None and (tubed := self._attempt(guess, near, limits)).solved:
             guess = out_of_tube(tubed.path)
         return self._attempt(guess, problem, limits)
@@ -217,7 +222,8 @@ class Ladder:
             return replace(last, answer=replace(last.answer, status="stopped"))
         begun = time.perf_counter()
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
-        nlp = transcribe_onto(problem, guess, units_of(problem, guess), self.compiled)
+        units = units_of(problem, guess)
+        nlp = transcribe_onto(problem, guess, units, self.compiled, chart_of(problem, guess, units.origin))
         # Later attempts start from answers, where all rows have values.
         if last is None:
             refuse_undefined_rows(nlp, problem, guess)

@@ -2,17 +2,19 @@
 
 import math
 import runpy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dmoc import solve
+from dmoc import KeepIn, PointGravity, State, TransferProblem, solve
 from dmoc.checks.verification import verify
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube
 from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import find, load_problem
+from dmoc.solver.meshes import coarse_to_fine, first_path
 from dmoc.solver.starts import local_optima
 
 GEO = runpy.run_path(str(find("geo_raise")))
@@ -119,6 +121,16 @@ def test_whatever_the_phase_the_default_guess_is_next_to_a_good_optimum(duration
 
 def test_coarse_meshes_follow_the_revolutions():
     """With four steps a revolution on the first mesh a hundred of them took it 1,000 iterations for nothing."""
-    solution = solve(make("geo_raise", revolutions=100.0)).raise_for_status()
-    assert solution.ladder[0].steps >= 9.9 * 100
-    assert sum(level.iterations for level in solution.ladder) <= 100
+    far = 1e9
+    boxed = replace(make("geo_raise", revolutions=100.0), constraints=[KeepIn((-far,) * 3, (far,) * 3)])
+    _, meshes = coarse_to_fine(boxed, first_path(boxed, order=6))
+    assert len(meshes) > 1 and len(meshes[0]) - 1 >= 9.9 * 100
+
+
+def test_numbers_that_a_goal_fixes_are_not_lost():
+    """Shots know the conditions of a goal alone."""
+    start = State((1, 0), (0, 1))
+    goal = State((None, None), (None, 0.9))
+    problem = TransferProblem(1.0, start, goal, 20 * math.pi, effects=[PointGravity(1.0)])
+    solution = solve(problem).raise_for_status()
+    assert solution.velocity[-1][1] == pytest.approx(0.9)

@@ -64,21 +64,34 @@ def test_a_switch_keeps_the_first_moment_by_two_pieces():
     assert known.nodes[:, 1, 0] == pytest.approx(-1.0, abs=0.05)
 
 
-def test_a_control_without_a_moment_is_held_at_its_mean():
+def test_a_coast_within_a_step_is_flown_node_by_node():
+    """Without a first moment two pieces would be one, the mean."""
     controls = np.column_stack([[1.0, 1.0, -1.0, 1.0, 1.0], np.zeros(5)])
     problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
     known = flown(Dynamics.of(problem), path_with(8, controls))
     assert known.broken.all()
-    assert known.nodes[:, :, 0] == pytest.approx(scheme(8).weights @ controls[:, 0])
+    assert known.nodes[0] == pytest.approx(controls, abs=2e-6)
+    assert np.diff(known.mesh) == pytest.approx(scheme(8).weights)
 
 
-def test_of_a_moment_that_no_pieces_have_within_the_limit_the_most_is_kept():
-    rule = scheme(8)
+def test_a_thrust_at_its_limit_that_turns_keeps_nearly_all_of_its_polynomial():
+    """Over a step of a sixth of a revolution the polynomial through its nodes exceeds the limit by 3e-4."""
+    angle = np.pi / 3 * scheme(8).points
+    controls = np.column_stack([np.cos(angle), np.sin(angle)])
+    problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BallForce(1.0 - 2 * BREAKS))
+    known = flown(Dynamics.of(problem), path_with(8, controls))
+    assert known.broken.all() and len(known.mesh) == 2
+    assert np.abs(known.nodes[:, 0] - controls).max() < 0.01
+    assert np.linalg.norm(known.sampled(33)[1], axis=1).max() <= 1.0
+
+
+def test_of_a_moment_that_nothing_has_within_the_limit_the_most_is_kept():
+    rule = scheme(4)
     matrix = np.vstack([rule.weights, rule.weights * (rule.points - 0.5)])
     # With so large a moment about a mean so near the limit any two pieces would exceed it.
     values = np.linalg.lstsq(matrix, np.array([0.95, 0.2]), rcond=None)[0]
     problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BoxForce(1.0))
-    known = flown(Dynamics.of(problem), path_with(8, np.column_stack([values, np.zeros(5)])))
+    known = flown(Dynamics.of(problem), path_with(4, np.column_stack([values, np.zeros(3)])))
     first, second = known.nodes[0, :, 0]
     lengths = np.diff(known.mesh)
     assert np.dot(lengths, [first, second]) == pytest.approx(0.95, abs=1e-12)
