@@ -71,6 +71,7 @@ class Reference:
 LANDING = "closed form (Meditch 1964)"
 MARS = "Bryson & Ho 1975: {}; indirect shooting"
 COPS = "COPS 3.0: 1.01283; collocation in three phases"
+EULER = "indirect shooting on Euler's equations"
 SHOOTING = "40 segments of constant thrust (3)"
 NO_AIR = {"oblate": False, "air": False}
 # One line an optimum that is known; where more than the mesh explains differs, a note below.
@@ -89,6 +90,13 @@ TABLE = (
     Reference("leo_raise", "fuel", 6.6210851417, "closed form, two impulses (2)", (4, 50), 1e-4, NO_AIR),
     Reference("dionysus", "mass", 2718.34, "example of ASSET", (6, 400), 5e-5, unit="kg"),
     Reference("geo_raise", "effort", 3729263.1, "limit of many revolutions (4)", (6, 400), 3e-4),
+    Reference("reorientation", "effort", 0.753733560549, EULER, (8, 32), 1e-9),
+    Reference("spin_to_spin", "effort", 0.290469349785, EULER, (8, 32), 1e-9),
+    Reference("heavy_top", "effort", 1.273065578142, EULER, (8, 32), 1e-9),
+    Reference(
+        "fast_turn", "least time", 3.243083277, "Bilimoria & Wie 1993: 3.243; switching times", (4, 100), 1e-4
+    ),
+    Reference("twelve_thrusters", "impulse", 5.7500, "other discretisations (5)", (4, 100), 3e-4),
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )
 NOTES = """
@@ -99,6 +107,7 @@ close long burns cost no more, and finer meshes tend to the bound.
 (3) Forward-backward shooting; the published 0.946927 (pykep 3) is for 20 segments from one random start. Of
 fourteen starts six end there or near, most at this transfer, which is 0.98420 with 20 segments.
 (4) m² D² / (2 T), a closed form for circles; five, ten and twenty revolutions differ by 4e-3, 9e-4 and 2e-4.
+(5) Midpoint states with 200 steps and order 4 with 40 give 5.75026 and 5.75088, good to 1e-4.
 """
 
 
