@@ -80,9 +80,10 @@ class Program:
 
         n, origin, places = problem.dimension, self.units.origin, places_in(self.dynamics.configuration.blocks)
         boxes = [constraint.bounds(n) for constraint in problem.constraints]
-        sides = [np.full(len(places), side) for side in (-np.inf, np.inf)]
-        for side, found in zip(sides, _intersection(boxes, n), strict=True):
-            side[places] = found[: places.sum()]
+        sides = []
+        for found, free in zip(_intersection(boxes, n), (-np.inf, np.inf), strict=True):
+            sides.append(np.full((*found.shape[:-1], len(places)), free))
+            sides[-1][..., places] = found[..., : places.sum()]
         put("position", *(side - origin for side in sides))
         put("force", *problem.actuator.bounds(n))
         if problem.free_duration:

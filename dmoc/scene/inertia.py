@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
+from dmoc.basics.quaternions import rotation_of
+from dmoc.effects.base import Body
 from dmoc.scene.ends import Boundary
 
 # An inertia has so many principal moments.
@@ -98,4 +101,24 @@ def check_acts_on(part: Any, turns: bool, moves: bool) -> None:
         raise ValueError(
             f"{name} acts on a position, but the ends are attitudes alone; use what acts on attitudes, such as "
             "Torque(), or give the ends a position (Pose)"
+        )
+
+
+def check_body_effect(effect: Any, inertia: Any) -> None:
+    """Raise ValueError if a user's own effect on a body gives another number of values than it must."""
+    place, velocity, rate = (ca.SX.sym(name, AXES) for name in ("q", "v", "w"))
+    attitude = ca.SX.sym("attitude", 4)
+    body = Body(place, velocity, attitude, rotation_of(attitude), rate, np.array(inertia))
+    name, t, m = type(effect).__name__, ca.SX.sym("t"), ca.SX.sym("m")
+    try:
+        potential, pushes = effect.lagrangian_of(t, body, m), effect.wrench_of(t, body, m)
+        sizes = [None if part is None else ca.SX(part).numel() for part in pushes]
+    except Exception as error:  # whatever a user's function raises
+        words = " ".join(str(error).split())[:120]
+        raise ValueError(f"{name} fails: {words}; write it with casadi's functions of (t, body, m)") from error
+    if potential is not None and ca.SX(potential).numel() != 1:
+        raise ValueError(f"{name}.lagrangian must give 1 value; it gives {ca.SX(potential).numel()}")
+    if len(sizes) != 2 or any(size not in (None, AXES) for size in sizes):
+        raise ValueError(
+            f"{name}.wrench must give a force and a torque of {AXES} values each, or None; it gives {sizes}"
         )

@@ -20,7 +20,7 @@ from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
-from dmoc.scene.inertia import check_acts_on, turning_checked
+from dmoc.scene.inertia import check_acts_on, check_body_effect, turning_checked
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -234,6 +234,10 @@ def _check_functions(problem: TransferProblem) -> None:
     u = ca.SX.sym("u", problem.controls)
     functions: list[tuple[Any, str, list, int]] = [(actuator, "force", [u], n)]
     for effect in problem.effects:
+        if effect.turns_body:
+            if _is_users(effect):
+                check_body_effect(effect, problem.inertia)
+            continue
         single = isinstance(effect, Conservative)
         functions.append((effect, "lagrangian" if single else "force", [t, q, v, m], 1 if single else n))
     for _, term in problem.objective.terms:
