@@ -27,6 +27,7 @@ from scipy.interpolate import CubicSpline
 from dmoc import State, TransferProblem
 from dmoc.effects import Force
 from dmoc.guess.starting import starting_guess
+from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics, specific_lagrangian
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.units import units_of
@@ -217,7 +218,7 @@ def _momenta(draft: Draft) -> ca.Function:
     h, m, velocity = draft.h * draft.duration, problem.mass, speed * (q1 - q0) / draft.h
 
     def lagrangian(t, q, v):
-        return 0.5 * ca.dot(v, v) + specific_lagrangian(problem.effects, t, q, v, m)
+        return 0.5 * ca.dot(v, v) + specific_lagrangian(problem.effects, configuration_of(problem), t, q, v, m)
 
     working = [effect for effect in problem.effects if isinstance(effect, Force)]
     pushes = [0.5 * h / m * sum(e.force(t, q, velocity, m) for e in working) for t, q in ends]

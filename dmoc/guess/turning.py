@@ -26,9 +26,9 @@ from dmoc.scene.problem import TransferProblem
 
 # The attitude of a body of which neither end says how it is turned.
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
-# The guess of a turn in least time is bent off the axis of the turn by this angle [rad]: on the axis itself the
-# turn is stationary, and up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie, J. Guid. Control Dyn.
-# 16 (1993)).
+# The guess is bent off the axis of the turn by this angle [rad]: a turn about a principal axis is stationary and
+# need not be cheapest. In least time it is up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie,
+# J. Guid. Control Dyn. 16 (1993)), and by the least effort a body tilts to turn about an axis of less inertia.
 BENT = 0.6
 # A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
 LEISURE = 1.2
@@ -58,11 +58,9 @@ def turning_states(problem: TransferProblem, duration: float) -> tuple[np.ndarra
 
 
 def attitudes_along(problem: TransferProblem, duration: float, fractions: np.ndarray) -> np.ndarray:
-    """The attitude by a turn of constant rate, shape (nodes, 4), without a change of sign."""
+    """The attitude by a turn of about constant rate, shape (nodes, 4), without a change of sign."""
     q0, _, q1, _ = turning_states(problem, duration)
     path = slerp(q0, q1, fractions)
-    if not (problem.free_duration and problem.actuator.turning_limit()):
-        return path
     axis = rotation_vectors(times(conjugate(q0), q1))
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     aside = aside / (np.linalg.norm(aside) or 1.0)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
@@ -16,6 +14,7 @@ FINER = "more steps, a higher order, or --tol 1e-4, which chooses both"
 SHARPER = "another number of steps, another order, or another guess (--starts 6)"
 REMEDIES = {
     "residual": SHARPER,
+    "constraint": SHARPER,
     "rollout": FINER,
     "reference": FINER,
     "ledger": FINER,
@@ -57,7 +56,7 @@ def accuracy_words(solution: Solution, report: Report) -> str:
         return ""
     path = solution.path
     sizes = [f"{share * path.diagonal:.1e} m"] if path.place.size else []
-    sizes += [f"{np.degrees(share * path.turn):.1e} degrees"] if path.attitudes else []
+    sizes += [f"{math.degrees(share * path.turn):.1e} degrees"] if path.attitudes else []
     words = f" The path is right to about {share:.0e} of its extent, {' and '.join(sizes)}"
     if solution.tolerance is None and share > ACCURATE:
         words += f"; --tol {10 ** math.floor(math.log10(share / BETTER)):.0e} for better"

@@ -52,7 +52,7 @@ def test_edges_of_stability_are_where_theory_has_them():
 
 
 def test_the_verb_draws_prints_and_speaks_json(capfd, tmp_path):
-    options = ("--revolutions", 3, "--eccentricity", "0.2", "--steps", 5000)
+    options = ("--revolutions", 3, "--eccentricity", "0.2", "--steps", 5000, "--turned", 200)
     code, out, err = run(capfd, *options, "--plot", tmp_path / "s.svg")
     assert (code, err) == (0, "") and "<svg" in (tmp_path / "s.svg").read_text()
     for word in (
@@ -66,7 +66,7 @@ def test_the_verb_draws_prints_and_speaks_json(capfd, tmp_path):
         assert word in out
     code, out, err = run(capfd, *options, "--json")
     found = json.loads(out)
-    assert (code, err, list(found)) == (0, "", ["drift", "round_off", "unstable"])
+    assert (code, err, list(found)) == (0, "", ["drift", "turning", "round_off", "unstable"])
     assert {row["method"] for row in found["drift"]} >= {"order 2", "RK4", "DOP853"}
     assert [row["steps"] for row in found["round_off"]] == [5000] * 3
 

@@ -21,6 +21,7 @@ import dmoc
 from dmoc import (
     Actuator,
     Atmosphere,
+    Attitude,
     BallForce,
     Boundary,
     Constraint,
@@ -31,12 +32,16 @@ from dmoc import (
     KeepOut,
     LinearDrag,
     Objective,
+    PlateRadiation,
+    Plates,
     PointGravity,
+    Pose,
     RadiationPressure,
     Shadow,
     State,
     ThirdBody,
     Time,
+    Torque,
     TransferProblem,
     UniformAtmosphere,
     Wind,
@@ -56,9 +61,11 @@ def scene(**parts):
 
 HERE = TransferProblem(**scene())
 ELLIPSE = {"mu": 1.0, "a": 9.0, "e": 0.1, "i": 0.0, "node": 0.0, "argument": 0.0, "mean_anomaly": 0.0}
+PLATES = Plates((1.0,), ((1, 0, 0),), ((0, 1, 0),))
 # arguments that are good, one of which is then replaced
 MAKES = {
     "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6},
+    "Attitude": {"quaternion": (1, 0, 0, 0), "rate": (0, 0, 0), "other_way": False},
     "BallForce": {"limit": 2.0},
     "BoxForce": {"limit": 2.0},
     "CircularOrbit": {"radius": 2.0, "mu": 1.0, "center": (0, 0), "normal": None, "clockwise": False},
@@ -90,11 +97,12 @@ MAKES = {
     },
     "FinalHeight": {"axis": 1},
     "FinalRadius": {"center": (0, 0)},
+    "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
     "KeepIn": {"lower": (-9, -9), "upper": (9, 9)},
     "KeepOut": {"center": (2, 2), "radius": 0.5},
     "LinearDrag": {"coefficient": 0.1, "wind": None},
-    "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched"},
+    "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched", "attitude": None, "rate": "matched"},
     "Nozzles": {
         "directions": ((1, 0), (-1, 0), (0, 1), (0, -1)),
         "max_thrust": 2.0,
@@ -102,13 +110,30 @@ MAKES = {
         "dry_mass": 0.1,
     },
     "Orbit": dict.fromkeys(("i", "raan", "argp", "nu")) | {"mu": 1.0, "a": 2.0, "e": 0.1, "center": (0, 0)},
+    "PivotGravity": {"acceleration": (0, 0, -1), "arm": (0, 0, 1)},
+    "PlateDrag": {"plates": PLATES, "density": 1.0, "coefficient": 1.1},
+    "PlateRadiation": {"plates": PLATES, "direction": (1, 0, 0), "flux": 1361.0, "reflectivity": 0.3},
+    "Plates": {"areas": (1.0,), "normals": ((1, 0, 0),), "offsets": ((0, 1, 0),)},
     "PointGravity": {"mu": 1.0, "center": (0, 9)},
+    "PointingKeepIn": {"axis": (1, 0, 0), "direction": (1, 0, 0), "angle": 179.0},
+    "PointingKeepOut": {"axis": (1, 0, 0), "direction": (-1, 0, 0), "angle": 20.0},
+    "Pose": {"position": (4, 0, 0), "velocity": (0, 0, 0), "attitude": (1, 0, 0, 0), "rate": (0, 0, 0)},
     "RadiationPressure": {"area": 1.0, "reflectivity": 0.5, "sun": (1.5e11, 0), "shadow": None},
+    "RateLimit": {"limit": 9.0},
     "RotatingFrame": {"rate": 0.1},
     "SpeedLimit": {"limit": 9.0},
     "Spring": {"stiffness": 1.0, "anchor": (0, 0)},
     "State": {"position": (0, 0), "velocity": (0, 0)},
     "ThirdBody": {"mu": 1.0, "position": (9, 9)},
+    "Thrusters": {
+        "positions": ((1, 0, 0), (-1, 0, 0)),
+        "directions": ((0, 1, 0), (0, 1, 0)),
+        "max_thrust": 2.0,
+        "both_ways": False,
+        "exhaust_velocity": 100.0,
+        "dry_mass": 0.1,
+    },
+    "Torque": {"limit": 2.0},
     "TransferProblem": scene(
         effects=(), actuator=FreeForce(), objective=Effort(), constraints=(), guess=None, start_time=0.0
     ),
@@ -116,6 +141,7 @@ MAKES = {
     "UniformGravity": {"acceleration": (0, -1)},
     "WeightedSum": {"parts": ((1.0, Effort()), (2.0, Time()))},
     "Wind": {"field": (0, 1)},
+    "Wrench": {"force_limit": 2.0, "torque_limit": 2.0, "frame": "body", "lever": 1.0},
     "circular_motion": {"radius": 9.0, "rate": 0.1, "phase": 0.0, "inclination": 0.0},
     "kepler_motion": ELLIPSE,
     "tabulated_motion": {"times": (0, 1, 2, 3), "positions": ((9, 0), (9, 1), (9, 2), (9, 3))},
@@ -200,10 +226,24 @@ def answered(call):
             return None
 
 
+def put_on_a_body(part):
+    """A problem of a body that turns with this part in it."""
+    alone = not part.moves_body if hasattr(part, "moves_body") else not part.has_position
+    ends = (Attitude((1, 0, 0, 0)),) * 2 if alone else (Pose((0, 0, 0)), Pose((4, 0, 0)))
+    parts = {"start": ends[0], "goal": ends[1], "actuator": Torque(), "inertia": (1, 1, 1)}
+    kinds = {Boundary: "goal", Actuator: "actuator", Effect: "effects", Constraint: "constraints"}
+    name = next(name for kind, name in kinds.items() if isinstance(part, kind))
+    return TransferProblem(**scene(**(parts | {name: [part] if name.endswith("s") else part})))
+
+
 def put_to_use(part):
     """A problem with this part in it."""
     if isinstance(part, TransferProblem):
         return part
+    if isinstance(part, Plates):
+        part = PlateRadiation(part, (1, 0, 0))
+    if getattr(part, "turns_body", False):
+        return put_on_a_body(part)
     if isinstance(part, tuple):
         return TransferProblem(1.0, State((0, 0, 0), (0, 0, 0)), State((4, 0, 0), (0, 0, 0)), 4.0, part)
     if isinstance(part, Atmosphere):
@@ -239,6 +279,8 @@ def test_every_constructor_is_tried():
     abstract = {
         "Actuator",
         "Atmosphere",
+        "BodyConservative",
+        "BodyForce",
         "Boundary",
         "Conservative",
         "Constraint",
@@ -248,6 +290,7 @@ def test_every_constructor_is_tried():
     }
     without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}
     results = {
+        "Body",
         "Check",
         "Evidence",
         "Formulation",
