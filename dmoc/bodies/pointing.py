@@ -13,6 +13,7 @@ from dmoc.basics.arguments import Vector, checked, number, short, vector
 from dmoc.basics.digits import down, up
 from dmoc.basics.quaternions import rotated
 from dmoc.effects.base import Body
+from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.rows import Row
 
@@ -60,6 +61,11 @@ class _Cone(_OfAttitude):
             raise ValueError(f"{type(self).__name__}: angle must be less than 180 degrees; got {self.angle:g}")
         if not callable(self.direction):
             checked(self, direction=_unit("direction", self.direction))
+            return
+        name = f"{type(self).__name__}: direction"
+        remedy = "it must take a CasADi time [s] and give 3 numbers: write it with casadi's functions"
+        if (count := tried(name, self.direction, [ca.SX.sym("t")], remedy)) != 3:
+            raise ValueError(f"{name} must give 3 numbers; it gives {count}")
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -76,7 +82,7 @@ class _Cone(_OfAttitude):
     def _toward(self, t: Any) -> Any:
         if not callable(self.direction):
             return ca.vertcat(*_entries(self.direction))
-        direction = ca.vertcat(self.direction(t))
+        direction = as_column(self.direction(t))
         return direction / ca.sqrt(ca.dot(direction, direction))
 
     def angles(self, t: np.ndarray, attitude: np.ndarray) -> np.ndarray:

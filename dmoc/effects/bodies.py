@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short, vector
 from dmoc.effects.base import Attractor, Body, BodyConservative, BodyForce
+from dmoc.effects.user_functions import as_column, tried
 
 # The speed of light [m/s], exact by definition.
 LIGHT = 299_792_458.0
@@ -47,10 +48,12 @@ class GravityGradient(BodyConservative):
         checked(
             self,
             mu=number("mu", self.mu, "m^3/s^2", positive=True),
-            center=vector("center", self.center, "m"),
+            center=_three("center", self.center, "m"),
         )
-        if self.place is not None and not callable(self.place):
-            checked(self, place=vector("place", self.place, "m"))
+        if callable(self.place):
+            _of_time("GravityGradient: place", self.place)
+        elif self.place is not None:
+            checked(self, place=_three("place", self.place, "m"))
 
     def attractor(self) -> Attractor | None:
         return None
@@ -63,7 +66,7 @@ class GravityGradient(BodyConservative):
         if self.place is None:
             position = body.position
         else:
-            position = self.place(t) if callable(self.place) else ca.DM(self.place)
+            position = as_column(self.place(t)) if callable(self.place) else ca.DM(self.place)
         offset = position - ca.DM(self.center)
         radius = ca.sqrt(ca.dot(offset, offset))
         inertia = ca.DM(np.asarray(body.inertia))
@@ -176,14 +179,19 @@ class PlateDrag(BodyForce):
 
     def __post_init__(self) -> None:
         _check_plates(self.plates)
-        if not callable(self.density):
+        if callable(self.density):
+            given = [ca.SX.sym("t"), ca.SX.sym("q", 3)]
+            remedy = "it must take (t, q) and give a density [kg/m^3]"
+            if tried("PlateDrag: density", self.density, given, remedy) != 1:
+                raise ValueError(f"PlateDrag: density gives more than one number; {remedy}")
+        else:
             checked(self, density=number("density", self.density, "kg/m^3", positive=True))
         checked(self, coefficient=number("coefficient", self.coefficient, "-", positive=True))
 
     def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         speed = ca.sqrt(ca.dot(body.velocity, body.velocity) + 1e-16)
         ahead = body.rotation.T @ body.velocity / speed
-        density = self.density(t, body.position) if callable(self.density) else self.density
+        density = as_column(self.density(t, body.position)) if callable(self.density) else self.density
         pressure = self.coefficient * density * speed**2
         return self.plates.wrench(body.rotation, ahead, lambda facing, normal: -pressure * facing * ahead)
 
@@ -240,6 +248,13 @@ class PlateRadiation(BodyForce):
 def _check_plates(plates: Any) -> None:
     if not isinstance(plates, Plates):
         raise ValueError(f"plates must be dmoc.Plates(areas, normals, offsets); got {short(plates)}")
+
+
+def _of_time(name: str, function: Callable) -> None:
+    """Raise ValueError unless a function of the time gives three numbers."""
+    remedy = "it must take a CasADi time [s] and give 3 numbers: write it with casadi's functions"
+    if (count := tried(name, function, [ca.SX.sym("t")], remedy)) != 3:
+        raise ValueError(f"{name} must give 3 numbers; it gives {count}")
 
 
 def _three(name: str, value: Any, unit: str) -> tuple[float, ...]:

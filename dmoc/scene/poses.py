@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.arguments import FreeVector, Vector, checked, entries, number, short, vector
+from dmoc.basics.arguments import FreeVector, Vector, checked, entries, flag, number, short, vector
 from dmoc.basics.quaternions import rotation_vectors
 from dmoc.scene.ends import Boundary, State
 
@@ -103,6 +103,7 @@ class Attitude(Turning):
 
     def __post_init__(self) -> None:
         checked(self, quaternion=_quaternion(self.quaternion), rate=_rate(self.rate))
+        checked(self, other_way=flag("other_way", self.other_way))
         if self.quaternion is None and all(entry is None for entry in self.rate or ()):
             raise ValueError("Attitude: quaternion and rate are both None; fix at least one of them")
 
@@ -160,6 +161,7 @@ class Pose(Turning):
             velocity=state.velocity,
             attitude=_quaternion(self.attitude),
             rate=_rate(self.rate),
+            other_way=flag("other_way", self.other_way),
         )
 
     @property
