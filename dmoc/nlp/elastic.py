@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import ALWAYS, run
+from dmoc.nlp.ipopt import ALWAYS, Interrupt, Watch, run
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
@@ -68,6 +68,8 @@ class Relaxation:
         How far the lower and the upper limits of these unknowns give way for a slack of 1, scaled.
     tell : callable
         Takes the `Level` of every run.
+    interrupt : Interrupt, optional
+        Ends a run, which then counts as one that found nothing.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class Relaxation:
         above=(),
         least: float = 0.0,
         tell: Callable[[Level], None] = lambda level: None,
+        interrupt: Interrupt | None = None,
     ):
         begun = time.perf_counter()
         self.nlp, self.least, self.count, self.tell = nlp, least, rows.shape[1], tell
@@ -91,6 +94,10 @@ class Relaxation:
         share = np.zeros((2 * number, self.count))
         share[:, 0] = np.concatenate([-np.asarray(above, float), np.asarray(below, float)])
         nlp_parts, settings = self._parts(_sparse(rows), ca.vertcat(pick, pick), _sparse(share))
+        # CasADi holds no reference to its callbacks.
+        sizes = [nlp_parts[name].numel() for name in ("x", "g", "p")]
+        self._watch = Watch(sizes[0], sizes[1], sizes[2], None, interrupt or Interrupt())
+        settings |= {"iteration_callback": self._watch}
         self.solver = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings)
         self.warm = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings | WARM)
         self._built = time.perf_counter() - begun

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
-import casadi as ca
 import numpy as np
 
-from dmoc.basics.memory import remembered
-from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.path import DiscretePath
+from dmoc.results.flown_cost import cost_functions
 from dmoc.scene.problem import TransferProblem
 
 # The size of the objective is estimated from this many nodes: more do not change its first digit.
@@ -65,8 +62,7 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0
     A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
     node it grows with the number of steps, so at the ends no more counts than the largest force in between.
     """
-    parts = problem.dimension, problem.objective, problem.actuator
-    rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
+    rate, terminal = cost_functions(problem)
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]
     velocity = np.gradient(guess.position[some], times, axis=0)
@@ -79,12 +75,3 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0
     rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
     end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
     return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
-
-
-def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
-    """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
-    t, q, v, m = state_symbols(problem.dimension)
-    u = ca.SX.sym("u", problem.controls)
-    rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
-    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
-    return ca.Function("rate", [t, q, v, u, m], [rate]), terminal

@@ -20,14 +20,11 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.cause import Cause, cause_of
+from dmoc.solver.cause import Cause, confirmed_cause
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
 from dmoc.solver.rung import Rung
 
-# The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: the error of the
-# mesh is far smaller, so a finer one cannot help.
-HOPELESS = 0.05
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
 # A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
@@ -88,9 +85,8 @@ class Ladder:
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
-            cause = rung.cause
-            hopeless = cause is not None and HOPELESS < cause.excess < np.inf
-            if rung.stopped or (not rung.solved and hopeless):
+            cause = None if rung.cause is None or rung.cause.coarse else rung.cause
+            if rung.stopped or (not rung.solved and cause is not None and cause.hopeless):
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first
@@ -143,7 +139,9 @@ class Ladder:
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
-        cause = cause_of(self._rounded(rounding), start, self._levels.append)
+        cause = confirmed_cause(self._rounded(rounding), start, self._levels.append, self.interrupt)
+        if self.interrupt.seen:
+            return replace(rung, answer=replace(rung.answer, status="stopped"))
         if cause.path is None:
             return replace(rung, cause=cause)
         return self.solve_on(cause.path, rounding, MOST_TRYING)
@@ -154,20 +152,25 @@ class Ladder:
         rounding: float | None = None,
         most: int = MOST_TRYING,
         pinned: bool = False,
+        lean: float = 0.0,
     ) -> Rung:
-        """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration."""
-        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most}, pinned=pinned)
+        """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration.
+
+        With `lean` the answer is held near the guess, as strongly as `NLP.leaning` says.
+        """
+        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most}, pinned=pinned, lean=lean)
 
     def ask(self, problem: TransferProblem, guess: DiscretePath, question: str) -> Rung:
         """One attempt of few iterations at another problem, whose answer helps; `question` says what it is."""
         return self._attempt(guess, problem, {"ipopt.max_iter": MOST_TRYING}, question=question)
 
-    def refine_on(self, guess: DiscretePath, pinned: bool = False) -> Rung:
+    def refine_on(self, guess: DiscretePath, pinned: bool = False, lean: float = 0.0) -> Rung:
         """Solve on a finer mesh from the answer on a coarser one, in a few hundred iterations or not at all.
 
         Where equally good paths differ in their duration Ipopt wanders from one to the other: what fails is
         tried again with the duration `pinned` to that of the coarser mesh, and with a wider rounding of |F| on
-        the way. Pinned from the outset, the free duration comes last.
+        the way. Pinned from the outset, the free duration comes last. `lean` is how strongly an answer is held
+        near the guess.
         """
         rounding = self.problem.actuator.smoothing
         by_way: list[float | None] = [None] if rounding is None else [WIDER * rounding, None]
@@ -179,7 +182,7 @@ class Ladder:
             start = guess
             for width in widths:
                 most = MOST_TRYING if pin or width else MOST_REFINING
-                rung = self.try_on(start, width, most, pin)
+                rung = self.try_on(start, width, most, pin, lean)
                 start = rung.path if rung.solved else start
             if rung.stopped or rung.solved:
                 break
@@ -208,6 +211,7 @@ class Ladder:
         limits: dict[str, Any] | None = None,
         question: str = "",
         pinned: bool = False,
+        lean: float = 0.0,
     ) -> Rung:
         answers = [one for one in self._rungs if not one.level.question]
         last = answers[-1] if answers else None
@@ -220,14 +224,19 @@ class Ladder:
         if last is None:
             refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
-        solver = nlp.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
+        asked_of = nlp.leaning(guess, lean) if lean else nlp
+        solver = asked_of.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
         built = time.perf_counter() - begun
         answer = nlp.run(solver, problem, guess, pinned)
+        if lean:
+            true = float(nlp.assembly.objective(answer.x, nlp.parameters(problem)))
+            answer = replace(answer, objective=true)
         if watch.error is not None:
             raise watch.error
         level = replace(nlp.level(answer, built), question=question)
         asked = problem if question else self._asked(problem)
-        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned))
+        pull = nlp.pull(nlp.unpack(answer.x, problem), guess, lean) if lean else 0.0
+        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull))
         self._levels.append(level)
         return self._rungs[-1]
 

@@ -10,6 +10,7 @@ import numpy as np
 from dmoc.basics.digits import down, time_unit, up
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import Relaxation, Relaxed
+from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import transcribe_onto
@@ -56,7 +57,7 @@ class Relaxable:
     """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort.
 
     Limits are told of as those of `given`, which are smaller where they were raised. `tell` takes the `Level`
-    of every run.
+    of every run; `interrupt` ends them.
     """
 
     def __init__(
@@ -64,9 +65,10 @@ class Relaxable:
         problem: TransferProblem,
         guess: DiscretePath,
         tell: Callable[[Level], None],
+        interrupt: Interrupt,
         given: TransferProblem | None = None,
     ):
-        self.tell = tell
+        self.tell, self.interrupt = tell, interrupt
         longest = problem.duration_bounds[1]
         self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
         self.problem = replace(problem, duration=longest, objective=Effort())
@@ -81,7 +83,7 @@ class Relaxable:
         columns, below, above = (
             np.concatenate([getattr(limit, name) for limit in limits]) for name in ("columns", "below", "above")
         )
-        return Relaxation(self.nlp, rows, columns, below, above, least, self.tell)
+        return Relaxation(self.nlp, rows, columns, below, above, least, self.tell, self.interrupt)
 
     def taken(self) -> tuple[float, float]:
         """Mean force and mean speed along the guess over their limits [-]; 0 without a limit.

@@ -24,6 +24,7 @@ class Rung:
     """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure.
 
     `pinned` says that it kept the duration of its guess, free as that is; `notes` tell a user of the way to it.
+    `pull` is by how much it is no optimum since it was held near its guess [-].
     """
 
     number: int
@@ -34,6 +35,7 @@ class Rung:
     cause: Cause | None = None
     pinned: bool = False
     notes: tuple[str, ...] = ()
+    pull: float = 0.0
 
     @property
     def solved(self) -> bool:

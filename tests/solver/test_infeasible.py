@@ -52,6 +52,12 @@ def asked_for(solution, pattern):
     return float(found[1]), float(found[2])
 
 
+def on_one_mesh(failed):
+    """Whether the problem itself was tried on one mesh; twice its steps tell that the mesh is not to blame."""
+    tried = {level.steps for level in failed.ladder if not level.question}
+    return len(tried) == 1 and {level.steps for level in failed.ladder} == {*tried, 2 * max(tried)}
+
+
 # a problem with too small a limit as a function of the limit, that limit, and what is known of the one needed
 LIMITED = {
     "one axis": (lambda f: rest_to_rest([1.0], 1.9, actuator=BoxForce(f)), 1.0, 4 / 1.9**2),
@@ -80,7 +86,8 @@ def test_the_limit_that_is_enough(name):
     problem, given, known = LIMITED[name]
     failed = solve(problem(given))
     needed, said = asked_for(failed, "(?:force limit|thrust) of # N .you gave # N")
-    assert said == given and len({level.steps for level in failed.ladder}) == 1
+    assert said == given
+    assert on_one_mesh(failed)
     assert known is None or needed == pytest.approx(known, rel=2e-3)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
@@ -118,7 +125,7 @@ def test_a_limit_that_is_off_by_orders_of_magnitude(name):
     failed = solve(problem(given))
     needed, said = asked_for(failed, "(?:force limits?|thrust) of [(]?#.*?.you gave [(]?#")
     assert said == given and needed == pytest.approx(known, rel=2e-3)
-    assert len({level.steps for level in failed.ladder}) == 1
+    assert on_one_mesh(failed)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
 
@@ -179,7 +186,8 @@ def test_the_duration_that_is_enough(name):
     problem, given, known = BRIEF[name]
     failed = solve(problem(given))
     needed, said = asked_for(failed, "# s .you gave # s")
-    assert said == given and len({level.steps for level in failed.ladder}) == 1
+    assert said == given
+    assert on_one_mesh(failed)
     assert known is None or needed == pytest.approx(known, rel=5e-3)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
