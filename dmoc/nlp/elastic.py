@@ -40,12 +40,16 @@ WARM = {
 
 @dataclass(frozen=True)
 class Relaxed:
-    """The answer of one elastic NLP: the slacks, the path, and whether it keeps all rows with these slacks."""
+    """The answer of one elastic NLP: the slacks, the path, and whether it keeps all rows with these slacks.
+
+    The slacks are the least ones if it is `exact`, else they are enough.
+    """
 
     slack: np.ndarray
     path: DiscretePath
     feasible: bool
     multipliers: dict[str, Any] = field(default_factory=dict)
+    exact: bool = True
 
 
 class Relaxation:
@@ -157,7 +161,8 @@ class Relaxation:
         excess = np.maximum(bounds["lbg"] - g, g - bounds["ubg"]).max(initial=0.0)
         path = self.nlp.unpack(z[: -self.count], problem)
         multipliers = {"lam_x0": found.lam_x, "lam_g0": found.lam_g}
-        return Relaxed(z[-self.count :], path, bool(np.isfinite(z).all() and excess <= MET), multipliers)
+        feasible = bool(np.isfinite(z).all() and excess <= MET)
+        return Relaxed(z[-self.count :], path, feasible, multipliers, found.status == "solved")
 
 
 def _sparse(matrix: np.ndarray) -> ca.DM:

@@ -52,12 +52,16 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
     force = max(force, LEAST_SHARE * typical) if force else typical
-    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, force))) or 1.0
+    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, force)))
+    # All nozzles at once make no force, one of them does.
+    cost = cost or abs(cost_along(problem, guess, force, alone=True)) or 1.0
     return Units(length, time, force, problem.mass, cost, 0.5 * (low + high))
 
 
-def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0) -> float:
+def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0, alone: bool = False) -> float:
     """About the objective along a guess, with `force` [N] in place of its controls if that is not zero.
+
+    If `alone`, the first of the controls has that value and the others are zero.
 
     A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
     node it grows with the number of steps, so at the ends no more counts than the largest force in between.
@@ -72,6 +76,7 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, force: float = 0.0
     control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
     control = control[np.minimum(nodes, len(guess.mesh) - 2) if guess.hold else some]
     control = np.full_like(control, force) if force else control
+    control[:, 1:] *= not alone
     rates = rate(times[None], guess.position[some].T, velocity.T, control.T, guess.mass[some][None])
     end = terminal(times[-1], guess.position[-1], guess.goal_velocity, guess.mass[-1])
     return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)

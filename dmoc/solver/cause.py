@@ -26,6 +26,8 @@ HOPELESS = 0.05
 # that is due to the mesh nothing is left, of a true one nearly all, or a third where force and speed share it
 # anew.
 SURE = 0.25
+# The mesh is asked for its share on guesses of up to this many nodes: finer ones are hardly to blame.
+MOST_CONFIRMED = 500
 # At most this many zones are relaxed, each alone, to find the one that is in the way.
 MOST_ZONES = 8
 # At most this many rows that cannot be met together are named, the worst first: a message must stay short.
@@ -87,7 +89,7 @@ def confirmed_cause(
     the steps at least, so that on ever shorter ones at least 2 e2 - e1 is left of excesses e1 and e2.
     """
     cause = cause_of(problem, guess, tell, interrupt)
-    if not 0 < cause.excess < np.inf:
+    if not 0 < cause.excess < np.inf or len(guess.position) > MOST_CONFIRMED:
         return cause
     finer = np.sort(np.append(guess.mesh, 0.5 * (guess.mesh[1:] + guess.mesh[:-1])))
     again = cause_of(problem, guess.onto(finer, guess.order, guess.hold), tell, interrupt, brief=True)
@@ -125,9 +127,9 @@ def cause_of(
         return Cause(excess=float(found.slack[0]))
     needs = []
     for limit in limits:
-        alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        if alone.feasible:
-            needs.append(limit.told(alone.slack[0]))
+        alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, found.path)
+        if alone.feasible and (words := limit.told(alone.slack[0])):
+            needs.append(words if alone.exact else f"{words}, which is more than enough")
     needs += transfer.durations(joint, found, transfer.problem.duration_bounds[0])
     return Cause(needs=tuple(needs), excess=float(found.slack[0])) if needs else _rows(transfer)
 

@@ -32,6 +32,8 @@ LEAST_HALVED = 9
 # Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
 # the first one may have been too short.
 LONGER = 10
+# Where it was as long as it may be already, so many shorter durations are tried.
+SOONER = 2
 # An attempt that is one of several ways to an answer ends after this many iterations: those that get there take
 # 20 to 130, and what takes longer wanders.
 MOST_TRYING = 150
@@ -115,8 +117,17 @@ class Ladder:
         rung = self.solve_on(start, rounding, most)
         if rung.solved or rung.stopped or not self.problem.free_duration:
             return rung
-        longer = min(self.problem.duration_bounds[1], LONGER * first.duration)
-        return self.solve_on(replace(first, duration=longer), rounding, most)
+        shortest, longest = self.problem.duration_bounds
+        if first.duration < longest:
+            longer = min(longest, LONGER * first.duration)
+            return self.solve_on(replace(first, duration=longer), rounding, most)
+        # The first guess was as long as may be: a target that moves may be met sooner.
+        for duration in np.geomspace(shortest, longest, 2 + SOONER)[-2:0:-1]:
+            guess = starting_guess(self.problem, first.mesh, first.order, first.hold, None, duration)
+            sooner = self.solve_on(guess, rounding, most)
+            if sooner.solved or sooner.stopped:
+                return sooner
+        return rung
 
     def _unexplained(self, rung: Rung) -> bool:
         """Whether an attempt failed without a reason; one that the user cut short has a reason."""
@@ -195,7 +206,9 @@ class Ladder:
         """
         problem, limits = self._rounded(rounding), {} if most is None else {"ipopt.max_iter": most}
         if guess.multipliers:
-            warm = self._attempt(guess, problem, limits)
+            # What takes longer from an answer near by wanders among paths that cost the same.
+            few = {} if problem.actuator.smoothing is None else {"ipopt.max_iter": MOST_REFINING}
+            warm = self._attempt(guess, problem, few | limits)
             if warm.solved or warm.stopped:
                 return warm
             guess = replace(guess, multipliers={})

@@ -100,7 +100,7 @@ class Relaxable:
 
     def limits(self) -> list[Giving]:
         """The limits that a longer duration eases."""
-        return [limit for limit in (self.force(), self.speed()) if limit is not None]
+        return [limit for limit in (self.force(), self.speed(), self.propellant()) if limit is not None]
 
     def force(self) -> Giving | None:
         """The limit of the actuator."""
@@ -136,6 +136,22 @@ class Relaxable:
             return (eased.largest_speed() or 0.0) / (given.largest_speed() or 1.0) if eased else np.inf
 
         return self._giving(told, factor, [group for group in self._groups() if self._limits_speed(group)])
+
+    def propellant(self) -> Giving | None:
+        """The dry mass, which gives way downwards: at a slack of 1 there is twice the propellant."""
+        dry = self.problem.actuator.dry_mass
+        load = self.problem.mass - dry
+        if not self.problem.actuator.burns or dry <= 0:
+            return None
+
+        def told(slack: float) -> str:
+            needed = dry - slack * load
+            return f"a dry mass of {down(needed)} kg (you gave {dry:g} kg)" if needed > 0 else ""
+
+        # The mass at the start is given and stays.
+        columns = self.nlp.columns["mass"].indices.ravel()[1:]
+        below, none = self.bounds[0][columns] * load / dry, np.empty(0, int)
+        return Giving(told, lambda slack: 1 + slack, 1, none, none, columns, below, np.zeros(len(columns)))
 
     def zones(self) -> list[Giving]:
         """The constraints that no longer duration eases, each by itself."""

@@ -58,6 +58,8 @@ SLOW = 2.0
 FLAT = 0.03
 # A refinement of more iterations than this wanders: others take 20 to 90.
 LONG = 100
+# A refinement that is not held ends after this many iterations: then it is tried anew, and held.
+LONGEST_FREE = 150
 # A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
 TIGHTER = 10.0
 # A mesh does no better if its change is more than this part of the one before [-]: the error that is estimated
@@ -121,9 +123,7 @@ class _Refinement:
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
-            rung = self.ladder.refine_on(
-                coarse.onto(_cut(coarse.mesh, parts), order, hold), self.flat, self.lean
-            )
+            rung = self._refined(coarse.onto(_cut(coarse.mesh, parts), order, hold))
             if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
@@ -145,6 +145,15 @@ class _Refinement:
                 return self._settled(self.reason)
             if self.worse == PATIENCE:
                 return self._settled(f"{self.reason}; finer meshes did no better")
+
+    def _refined(self, start: DiscretePath) -> Rung:
+        """An answer on a finer mesh; where that wanders among paths that cost the same, one that is held."""
+        if self.linear and not self.lean:
+            rung = self.ladder.try_on(start, most=LONGEST_FREE, pinned=self.flat)
+            if rung.solved or rung.stopped:
+                return rung
+            self.lean = min(HELD * self.tol, MOST_HELD)
+        return self.ladder.refine_on(start, self.flat, self.lean)
 
     def _hold_if_flat(self, rung: Rung) -> None:
         """Hold the answers to come near the one before if the path changes and the cost does not."""

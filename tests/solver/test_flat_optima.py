@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from dmoc import (
     Engine,
     FinalMass,
     Fuel,
+    Moving,
     Nozzles,
     PointGravity,
     RotatingFrame,
@@ -138,3 +140,24 @@ def test_what_is_flown_costs_what_the_nodes_say_where_no_limit_is_broken():
     solution = solve(free, order=6, steps=10)
     assert unpriced(free, Dynamics.of(free), solution.path, solution.objective) == 0.0
     assert np.isfinite(solution.objective)
+
+
+def test_the_effort_of_nozzles_has_a_unit_though_all_at_once_make_no_force():
+    """A unit of 1 N^2 s for an effort of 4e8 left the first-order conditions open by 2e-4 of 1."""
+    heavy = TransferProblem(
+        4655.271568681675,
+        State((119.72664887819526, 119.6408106038325), (3.535863108859444, 3.5091285081502264)),
+        State((119.86625356093921, 119.81667721032373), (3.343676749717904, 4.111767712489929)),
+        0.044603736000931295,
+        actuator=Nozzles(CROSS, 578403.8162589258),
+    )
+    solution = solve(heavy)
+    assert solution.success and verify(solution).ok
+
+
+def test_a_target_that_moves_is_met_sooner_where_the_longest_time_leads_nowhere():
+    place, speed, meeting = np.array([1.0, 0.5]), np.array([1.2, -0.8]), 2.0
+    target = Moving(lambda t: ca.DM(place) + ca.DM(speed) * ca.sin(3.0 * (t - meeting)) / 3.0, "matched")
+    chase = TransferProblem(1.0, State((0, 0), (0, 0)), target, (1.0, 3.6), actuator=BallForce(1.6))
+    solution = solve(chase, order=6)
+    assert solution.success, solution.message

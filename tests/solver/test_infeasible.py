@@ -230,3 +230,22 @@ def test_the_worst_rows_are_in_units_of_the_problem():
     # the momentum that 1 N cannot give, 4/1.9 - 1.9 N s in all, over half a step
     lacking = sum(size for name, size, _ in failed.worst[:2]) * 0.5 * 1.9 / 50
     assert lacking == pytest.approx(4 / 1.9 * 0.5 - 0.5 * 1.9, rel=0.05)
+
+
+def test_the_dry_mass_that_leaves_propellant_enough():
+    """Two short burns and a coast change the velocity by 2 d / T at least, which takes so much propellant."""
+    way, duration, exhaust, mass = 2.0, 4.0, 20.0, 1.7
+    least = mass * (1 - np.exp(-2 * way / duration / exhaust))
+    engine = Engine(12.0, exhaust_velocity=exhaust, dry_mass=mass - 0.7 * least)
+    still = (0.0, 0.0)
+    failed = solve(
+        TransferProblem(mass, State(still, still), State((way, 0.0), still), duration, actuator=engine)
+    )
+    needed, _ = asked_for(failed, "a dry mass of # kg .you gave # kg")
+    assert mass - 1.3 * least < needed < mass - least
+    assert on_one_mesh(failed)
+    enough = replace(engine, dry_mass=mass - 1.01 * (mass - needed))
+    answer = solve(
+        TransferProblem(mass, State(still, still), State((way, 0.0), still), duration, actuator=enough)
+    )
+    assert answer.success, answer.message
