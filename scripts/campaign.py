@@ -36,6 +36,8 @@ PLACE = re.compile(r"(?<=<!-- campaign -->\n).*?(?=<!-- end of campaign -->)", r
 HEAD = "| scenes | number | green | red | wrong | median s | worst s |\n|---|---|---|---|---|---|---|\n"
 # Seconds of processor time after which a solve is ended: a scene that takes longer counts as red.
 LONGEST = 12.0
+# A solve ends as well after so many times that on the clock [-], in what tells of no iterations.
+WAITED = 3.0
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "free space": plain.free_space,
     "gravity and air": plain.falling,
@@ -77,23 +79,27 @@ def make(family: str, seed: int) -> Scene:
     return FAMILIES[family](np.random.default_rng([zlib.crc32(family.encode()), seed]))
 
 
-def run(family: str, seed: int) -> Outcome:
-    """Make a scene, solve it, and judge the answer. The seconds are those of the program alone."""
+def run(family: str, seed: int, longest: float = LONGEST) -> Outcome:
+    """Make a scene, solve it in `longest` [s] of processor time, and judge the answer.
+
+    The seconds are those of the program alone.
+    """
     begin, taken = time.process_time(), [0.0]
     try:
-        verdict, why = judged(make(family, seed), taken)
+        verdict, why = judged(make(family, seed), taken, longest)
     except Exception as error:
         verdict, why = "wrong", f"{type(error).__name__}: {error}"
         taken[0] = taken[0] or time.process_time() - begin
     return Outcome(family, seed, verdict, why, round(taken[0], 3))
 
 
-def judged(scene: Scene, taken: list[float]) -> tuple[str, str]:
+def judged(scene: Scene, taken: list[float], longest: float) -> tuple[str, str]:
     """The verdict on a scene, and why; the seconds for solving and checking go into `taken`."""
     begin = time.process_time()
     try:
         problem = scene.problem
-        solution = solve(problem, **scene.options, progress=lambda *_: time.process_time() - begin > LONGEST)
+        late = {"progress": lambda *_: time.process_time() - begin > longest, "time_limit": WAITED * longest}
+        solution = solve(problem, **scene.options, **late)
     except ValueError as refusal:
         if not scene.blames:
             raise

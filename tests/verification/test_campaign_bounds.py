@@ -69,7 +69,7 @@ def test_in_a_turning_frame_the_bound_is_that_of_the_frame_that_stands(campaign)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     spin = rate * np.array([[0.0, -1.0], [1.0, 0.0]])
     standing = (q0, v0 + spin @ q0, turn @ q1, turn @ (v1 + spin @ q1))
-    push = physics.Push("engine", 2, 1.5, metered=True)
+    push = physics.Push("engine", 2, 6.0, metered=True)
     for cost in ("effort", "fuel"):
         turning = bounds.dual(physics.turning(rate, 2), push, mass, (q0, v0, q1, v1), T, cost)
         inertial = bounds.dual(physics.nothing(2), push, mass, standing, T, cost)
@@ -103,10 +103,10 @@ def test_least_time_is_two_pushes_and_knows_of_gravity(campaign):
 
 
 def test_the_judge_sees_an_answer_dearer_than_the_proven_optimum(campaign):
-    from campaign.bounds import SHARP
+    from campaign.bounds import SHARP, sharpened
 
-    seeds = range(50)
-    scene = next(s for s in (campaign["make"]("free space", seed) for seed in seeds) if s.truth.dear == SHARP)
+    made = (sharpened(campaign["make"]("free space", seed)) for seed in range(50))
+    scene = next(scene for scene in made if scene.truth.dear == SHARP)
     solution = dmoc.solve(scene.problem, order=4, steps=100)
     assert campaign["faults"](scene.truth, solution, None) == []
     cheaper = replace(scene.truth, known=solution.objective / (SHARP + 0.01), least=np.nan)
