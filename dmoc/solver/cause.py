@@ -69,12 +69,13 @@ class Cause:
         """Whether no finer mesh can help."""
         return HOPELESS < self.excess < np.inf and not self.coarse
 
-    def words(self) -> str:
-        """One line for a person; empty if nothing was found."""
+    def words(self, local: bool = False) -> str:
+        """One line for a person; empty if nothing was found. `local` if other guesses may well need less."""
         parts = []
         if self.needs:
             where = "with steps as long as these " if self.coarse else ""
-            parts.append(f"{where}the transfer needs {', or '.join(self.needs)}")
+            what = "a path near the guess" if local else "the transfer"
+            parts.append(f"{where}{what} needs {', or '.join(self.needs)}")
         if self.rows:
             parts.append(f"these rows cannot be met together: {', '.join(self.rows)}")
         return "; ".join(parts)

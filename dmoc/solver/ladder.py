@@ -275,7 +275,9 @@ class Ladder:
             return self._out_of_time(rung, errors, **found)
         known = errors or {}
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
-        reason = "" if rung.cause is None else rung.cause.words()
+        # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
+        local = self.problem.attraction.first is not None and self.problem.attraction.lone is None
+        reason = "" if rung.cause is None else rung.cause.words(local)
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}

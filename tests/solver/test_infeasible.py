@@ -27,6 +27,7 @@ from dmoc import (
     TransferProblem,
     UniformGravity,
     solve,
+    three_body,
 )
 from dmoc.nlp import elastic as relaxation
 from dmoc.scene.problem_file import load_problem
@@ -249,3 +250,17 @@ def test_the_dry_mass_that_leaves_propellant_enough():
         TransferProblem(mass, State(still, still), State((way, 0.0), still), duration, actuator=enough)
     )
     assert answer.success, answer.message
+
+
+def test_between_two_attractors_the_verdict_is_one_of_the_guess():
+    """One that passes on the wrong side of an attractor needs far more than another one would."""
+    hurried = TransferProblem(
+        1.0,
+        State((0.7, 0.0), (0.0, 0.2)),
+        State((0.75, 0.3), (0.0, 0.0)),
+        0.4,
+        effects=three_body(0.1),
+        actuator=BallForce(0.5),
+    )
+    failed = solve(hurried, order=6, steps=30)
+    assert "a path near the guess needs a force limit of" in failed.message, failed.message
