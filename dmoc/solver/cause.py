@@ -23,9 +23,8 @@ FAR_OFF = 10.0
 # to the mesh, and a finer one is then worth its time.
 HOPELESS = 0.05
 # A mesh is to blame if less than this part of the excess is sure to be left on ever shorter steps [-]: of one
-# that is due to the mesh nothing is left, of a true one nearly all, or a third where force and speed share it
-# anew.
-SURE = 0.25
+# that is due to the mesh nothing is left or, where burns are shorter than steps, up to 0.45; of a true one 0.9.
+SURE = 0.5
 # The mesh is asked for its share on guesses of up to this many nodes: finer ones are hardly to blame.
 MOST_CONFIRMED = 500
 # At most this many zones are relaxed, each alone, to find the one that is in the way.
@@ -90,7 +89,7 @@ def confirmed_cause(
     the steps at least, so that on ever shorter ones at least 2 e2 - e1 is left of excesses e1 and e2.
     """
     cause = cause_of(problem, guess, tell, interrupt)
-    if not 0 < cause.excess < np.inf or len(guess.position) > MOST_CONFIRMED:
+    if not 0 < cause.excess <= FAR_OFF or len(guess.position) > MOST_CONFIRMED:
         return cause
     finer = np.sort(np.append(guess.mesh, 0.5 * (guess.mesh[1:] + guess.mesh[:-1])))
     again = cause_of(problem, guess.onto(finer, guess.order, guess.hold), tell, interrupt, brief=True)
@@ -218,3 +217,13 @@ def _zones(transfer: Relaxable) -> Cause | None:
             needs.append(words)
             excess = max(excess, float(found.slack[0]))
     return Cause(needs=tuple(needs), excess=excess, zones=True) if needs else None
+
+
+def idle_share(problem: TransferProblem) -> float:
+    """The part of the propellant that an engine burns at rest, since |F| is rounded at zero [-]."""
+    engine, duration = problem.actuator, problem.duration_bounds[1]
+    if engine.smoothing is None or not engine.burns:
+        return 0.0
+    controls = np.zeros(problem.controls)
+    controls[-1] = engine.smoothing * (engine.force_limit() or 0.0)
+    return float(engine.flow(controls)) * duration / (problem.mass - engine.dry_mass)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,27 +21,24 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.cause import Cause, confirmed_cause
+from dmoc.solver.cause import Cause, confirmed_cause, idle_share
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung
+from dmoc.solver.rung import Rung, held_answer
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
 # A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
 LEAST_HALVED = 9
-# Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
-# the first one may have been too short.
+# Where a transfer of free duration fails, its guess may be too short: another one lasts so many times as long.
 LONGER = 10
-# Where it was as long as it may be already, so many shorter durations are tried.
+# Where it was as long as may be, so many shorter durations are tried.
 SOONER = 2
-# An attempt that is one of several ways to an answer ends after this many iterations: those that get there take
-# 20 to 130, and what takes longer wanders.
+# One of several attempts ends after this many iterations: those that get there take 20 to 130, others wander.
 MOST_TRYING = 150
 # A refinement of a mesh ends after this many iterations, and then each other way to it after the number above.
 MOST_REFINING = 300
-# On the way to a path that a wide rounding of |F| would find sooner, |F| is first rounded this many times as
-# wide.
+# On the way to a path that a wide rounding of |F| would find sooner, it is first this many times as wide.
 WIDER = 10.0
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
@@ -108,6 +106,8 @@ class Ladder:
         rung = self._explained(rung, start, rounding, known)
         if not quick or not self._unexplained(rung):
             return rung
+        if (held := held_answer(self.problem, partial(self.try_on, rounding=rounding), start)) is not None:
+            return replace(held, cause=rung.cause)
         return replace(self._solved_sooner_or_later(start, first, rounding), cause=rung.cause)
 
     def _solved_sooner_or_later(
@@ -150,11 +150,13 @@ class Ladder:
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
-        cause = confirmed_cause(self._rounded(rounding), start, self._levels.append, self.interrupt)
+        problem = self._rounded(rounding)
+        cause = confirmed_cause(problem, start, self._levels.append, self.interrupt)
         if self.interrupt.seen:
             return replace(rung, answer=replace(rung.answer, status="stopped"))
         if cause.path is None:
-            return replace(rung, cause=cause)
+            coarse = cause.coarse or cause.excess < idle_share(problem) - idle_share(self.problem)
+            return replace(rung, cause=replace(cause, coarse=coarse))
         return self.solve_on(cause.path, rounding, MOST_TRYING)
 
     def try_on(
@@ -207,10 +209,12 @@ class Ladder:
         problem, limits = self._rounded(rounding), {} if most is None else {"ipopt.max_iter": most}
         if guess.multipliers:
             # What takes longer from an answer near by wanders among paths that cost the same.
-            few = {} if problem.actuator.smoothing is None else {"ipopt.max_iter": MOST_REFINING}
+            few = {} if problem.actuator.smoothing is None else {"ipopt.max_iter": MOST_TRYING}
             warm = self._attempt(guess, problem, few | limits)
             if warm.solved or warm.stopped:
                 return warm
+            if few and (held := held_answer(self.problem, partial(self.try_on, rounding=rounding), guess)):
+                return held
             guess = replace(guess, multipliers={})
         near = in_tube(problem, guess)
         if near is not None and (tubed := self._attempt(guess, near, limits)).solved:

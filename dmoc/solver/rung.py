@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +12,20 @@ from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
+from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.cause import Cause
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
 WORTH_TELLING = 1e-5
+# An answer that was held near its guess is an optimum if it is off one by less than this [-], half of what the
+# check called optimality allows.
+OFF_OPTIMUM = 5e-6
+# Answers are held as strongly as this [-], one after the other: the last one is an optimum wherever it lies.
+HELD = (1e-2, 1e-3, 1e-4, 3e-6)
+# An attempt that is held ends after this many iterations: of four transfers between circles all got there.
+MOST_HOLDING = 200
 
 
 @dataclass(frozen=True)
@@ -77,3 +86,19 @@ class Rung:
             told = f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less"
             return (*self.notes, told)
         return self.notes
+
+
+def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:
+    """An optimum by way of answers that are held near the one before, ever less, or None.
+
+    Where many paths cost the same Ipopt wanders among them. Each of these attempts, made by `try_on` from a
+    path with a strength to hold it, begins without multipliers: with them the barrier is so low that a switch
+    moves from node to node.
+    """
+    rung = None
+    for lean in HELD if has_linear_controls(problem) else ():
+        rung = try_on(replace(start, multipliers={}), most=MOST_HOLDING, lean=lean)
+        if rung.stopped:
+            return rung
+        start = rung.path if rung.solved else start
+    return rung if rung is not None and rung.solved and rung.pull <= OFF_OPTIMUM else None

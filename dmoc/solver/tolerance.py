@@ -19,7 +19,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import Rung
+from dmoc.solver.rung import MOST_HOLDING, OFF_OPTIMUM, Rung
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
@@ -45,9 +45,6 @@ EQUALLY_GOOD = 0.1
 HELD = 10.0
 # An answer is held by no more than this [-]: it would keep switches from their places.
 MOST_HELD = 1e-3
-# An answer that meets the tolerance is held ever less until it is off an optimum by less than this [-], half of
-# what the check called optimality allows.
-OFF_OPTIMUM = 5e-6
 # Paths cost the same if their costs differ by less than this part of the tolerance [-].
 SAME_COST = 0.3
 # Where the change from mesh to mesh falls by less than this factor [-] all steps are cut, and not those alone
@@ -204,7 +201,9 @@ class _Refinement:
         begun, lean = rung, self.lean
         while rung.solved and rung.pull > OFF_OPTIMUM:
             lean *= 0.1
-            rung = self.ladder.try_on(rung.path, pinned=begun.pinned, lean=lean)
+            # With multipliers the barrier is so low that a switch moves from node to node.
+            start = replace(rung.path, multipliers={})
+            rung = self.ladder.try_on(start, most=MOST_HOLDING, pinned=begun.pinned, lean=lean)
         if not rung.solved:
             return begun
         none = np.ones(len(rung.nlp.mesh) - 1, int)

@@ -56,7 +56,7 @@ def asked_for(solution, pattern):
 def on_one_mesh(failed):
     """Whether the problem itself was tried on one mesh; twice its steps tell that the mesh is not to blame."""
     tried = {level.steps for level in failed.ladder if not level.question}
-    return len(tried) == 1 and {level.steps for level in failed.ladder} == {*tried, 2 * max(tried)}
+    return len(tried) == 1 and {level.steps for level in failed.ladder} <= {*tried, 2 * max(tried)}
 
 
 # a problem with too small a limit as a function of the limit, that limit, and what is known of the one needed
@@ -264,3 +264,17 @@ def test_between_two_attractors_the_verdict_is_one_of_the_guess():
     )
     failed = solve(hurried, order=6, steps=30)
     assert "a path near the guess needs a force limit of" in failed.message, failed.message
+
+
+def test_what_a_wide_rounding_burns_is_not_taken_for_a_lack_of_propellant():
+    """On the coarsest mesh |F| is rounded so widely that the engine at rest burns a fifth of the propellant."""
+    way, duration, exhaust, mass = 2.65, 3.72, 27.87, 1.289
+    engine = Engine(
+        11.6, exhaust_velocity=exhaust, dry_mass=mass * np.exp(-1.09 * 2 * way / duration / exhaust)
+    )
+    still = (0.0, 0.0)
+    problem = TransferProblem(
+        mass, State(still, still), State((way, 0.0), still), duration, actuator=engine, objective=Fuel()
+    )
+    answer = solve(problem, order=6, tol=1e-3)
+    assert answer.success, answer.message
