@@ -1,7 +1,9 @@
 """Solve random scenes that are possible (or not) by construction, and judge every answer without the package.
 
     ./scripts/run python scripts/campaign.py                     # the table, ten scenes a family
-    ./scripts/run python scripts/campaign.py --each 20 --readme  # and write it into the README
+    ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl  # goes on where it was ended
+    ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl --again   # what was not green
+    ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl --readme  # into the README
     ./scripts/run python scripts/campaign.py --family orbits --seed 3     # one scene, with what is said of it
 
 Green: solved, and every check of `verify` holds; or, where a scene is impossible, a failure that names a
@@ -11,17 +13,19 @@ The exit code is 1 if any is wrong.
 """
 
 import argparse
+import json
 import re
 import sys
 import time
 import zlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
 import numpy as np
-from campaign import orbits, plain
+from campaign import ends, limits, mixed, orbits, plain
+from campaign.bounds import sharpened
 from campaign.judge import faults
 from campaign.making import Scene
 
@@ -30,14 +34,32 @@ from dmoc import solve, verify
 README = Path(__file__).parents[1] / "README.md"
 PLACE = re.compile(r"(?<=<!-- campaign -->\n).*?(?=<!-- end of campaign -->)", re.DOTALL)
 HEAD = "| scenes | number | green | red | wrong | median s | worst s |\n|---|---|---|---|---|---|---|\n"
-# Seconds after which a solve ends with what it has: a scene that takes longer counts as red.
+# Seconds of processor time after which a solve is ended: a scene that takes longer counts as red.
 LONGEST = 12.0
+# A solve ends as well after so many times that on the clock [-], in what tells of no iterations.
+WAITED = 3.0
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "free space": plain.free_space,
     "gravity and air": plain.falling,
     "turning frames": plain.turning,
     "propellant": plain.burning,
+    "zones": limits.zones,
+    "speed limits": limits.speed,
+    "hardly enough": limits.tight,
+    "not enough": limits.impossible,
+    "open ends": ends.open_ends,
+    "moving goals": ends.moving,
+    "all units": ends.units,
     "orbits": orbits.orbits,
+    "eccentric": orbits.eccentric,
+    "hyperbolic": orbits.hyperbolic,
+    "polar": orbits.polar,
+    "retrograde": orbits.retrograde,
+    "perturbed orbits": orbits.perturbed,
+    "three bodies": orbits.three_bodies,
+    "circle to circle": orbits.circles,
+    "several revolutions": orbits.revolutions,
+    "anything with anything": mixed.mixed,
 }
 
 
@@ -57,33 +79,49 @@ def make(family: str, seed: int) -> Scene:
     return FAMILIES[family](np.random.default_rng([zlib.crc32(family.encode()), seed]))
 
 
-def run(family: str, seed: int) -> Outcome:
-    """Make a scene, solve it, and judge the answer."""
-    begin = time.process_time()
+def run(family: str, seed: int, longest: float = LONGEST) -> Outcome:
+    """Make a scene, solve it in `longest` [s] of processor time, and judge the answer.
+
+    The seconds are those of the program alone.
+    """
+    begin, taken = time.process_time(), [0.0]
     try:
-        scene = make(family, seed)
-        verdict, why = judged(scene)
+        verdict, why = judged(make(family, seed), taken, longest)
     except Exception as error:
         verdict, why = "wrong", f"{type(error).__name__}: {error}"
-    return Outcome(family, seed, verdict, why, time.process_time() - begin)
+        taken[0] = taken[0] or time.process_time() - begin
+    return Outcome(family, seed, verdict, why, round(taken[0], 3))
 
 
-def judged(scene: Scene) -> tuple[str, str]:
-    """The verdict on a scene, and why."""
-    solution = solve(scene.problem, **scene.options, time_limit=LONGEST)
+def judged(scene: Scene, taken: list[float], longest: float) -> tuple[str, str]:
+    """The verdict on a scene, and why; the seconds for solving and checking go into `taken`."""
+    begin = time.process_time()
+    try:
+        problem = scene.problem
+        late = {"progress": lambda *_: time.process_time() - begin > longest, "time_limit": WAITED * longest}
+        solution = solve(problem, **scene.options, **late)
+    except ValueError as refusal:
+        if not scene.blames:
+            raise
+        return blamed(scene, str(refusal))
+    finally:
+        taken[0] = time.process_time() - begin
     if scene.blames:
-        if solution.success:
-            return "wrong", "solved what is impossible"
-        said = solution.message
-        return ("green", said) if any(word in said for word in scene.blames) else ("red", said)
+        return ("wrong", "solved what is impossible") if solution.success else blamed(scene, solution.message)
     if not solution.success:
         return "red", f"{solution.status}: {solution.message}"
     report = verify(solution)
+    taken[0] = time.process_time() - begin
     failed = [f"{check.name} {check.value:.1e} > {check.limit:.1e}" for check in report.checks if not check.ok]
     if failed:
         return "red", f"fails {', '.join(failed)}"
-    found = faults(scene.truth, solution, scene.options.get("tol"))
+    found = faults(sharpened(scene).truth, solution, scene.options.get("tol"))
     return ("wrong", "; ".join(found)) if found else ("green", "")
+
+
+def blamed(scene: Scene, said: str) -> tuple[str, str]:
+    """The verdict on an impossible scene that was not solved: green if a limit is named."""
+    return ("green" if any(word in said for word in scene.blames) else "red"), said
 
 
 def table(outcomes: list[Outcome]) -> str:
@@ -98,22 +136,42 @@ def table(outcomes: list[Outcome]) -> str:
     return HEAD + "".join(lines)
 
 
+def journaled(path: Path | None, scenes: Iterable[tuple[str, int]], again: bool) -> Iterator[Outcome]:
+    """The outcomes of scenes, from a journal where it has them; others, and if `again` those that are not
+    green, are run and written into it, one line each. The last line of a scene counts.
+    """
+    known: dict[tuple[str, int], Outcome] = {}
+    if path is not None and path.exists():
+        for line in path.read_text().splitlines():
+            one = Outcome(**json.loads(line))
+            known[one.family, one.seed] = one
+    for family, seed in scenes:
+        one = known.get((family, seed))
+        if one is None or (again and one.verdict != "green"):
+            one = run(family, seed)
+            if path is not None:
+                with path.open("a") as journal:
+                    journal.write(json.dumps(asdict(one)) + "\n")
+        yield one
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--each", type=int, default=10, help="scenes a family")
     parser.add_argument("--first", type=int, default=0, help="seed of the first")
     parser.add_argument("--family", choices=FAMILIES, help="this family alone")
     parser.add_argument("--seed", type=int, help="this scene alone")
+    parser.add_argument("--journal", type=Path, help="keep outcomes in this file, and take known ones from it")
+    parser.add_argument("--again", action="store_true", help="run anew what is not green in the journal")
     parser.add_argument("--readme", action="store_true", help="write the table into the README")
     given = parser.parse_args()
     families = [given.family] if given.family else list(FAMILIES)
     seeds = range(given.first, given.first + given.each) if given.seed is None else [given.seed]
     outcomes = []
-    for family in families:
-        for seed in seeds:
-            outcomes.append(one := run(family, seed))
-            if one.verdict != "green" or given.seed is not None:
-                print(f"{family} {seed}: {one.verdict}, {one.seconds:.1f} s, {one.why}", flush=True)
+    for one in journaled(given.journal, [(family, seed) for seed in seeds for family in families], given.again):
+        outcomes.append(one)
+        if one.verdict != "green" or given.seed is not None:
+            print(f"{one.family} {one.seed}: {one.verdict}, {one.seconds:.1f} s, {one.why}", flush=True)
     print(found := table(outcomes), end="")
     if given.readme:
         README.write_text(PLACE.sub(lambda _: found, README.read_text()))

@@ -18,6 +18,7 @@ from dmoc.checks.optimality import stationarity
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
+from dmoc.results.flown_cost import unpriced
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
@@ -230,7 +231,8 @@ def _accuracy(evidence: Evidence) -> float:
 def _ledger(evidence: Evidence) -> Check:
     """Momentum and mass: discrete sums, exact. Energy: the work is a quadrature, of the scheme's order.
 
-    And the velocities, momenta and forces that the solution reports are those of its path.
+    And the velocities, momenta and forces that the solution reports are those of its path, and its objective
+    what the control costs that is flown.
     """
     momentum, gross = balance(evidence)
     masses = node_masses(evidence.dynamics, evidence.path, evidence.problem.mass)
@@ -244,6 +246,11 @@ def _ledger(evidence: Evidence) -> Check:
         note += f", mass to {mass:.1e}"
     if energy is not None and not energy <= accuracy:
         return Check.of("ledger", energy, accuracy, "of the energy", note)
+    priced = unpriced(evidence.problem, evidence.dynamics, evidence.path, evidence.solution.objective)
+    if priced:
+        note += f", cost to {priced:.1e} of {accuracy:g}"
+    if not priced <= accuracy:
+        return Check.of("ledger", priced, accuracy, "of the objective", note)
     return Check.of("ledger", value, exact, "of the impulse", note)
 
 

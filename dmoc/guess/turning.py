@@ -26,9 +26,9 @@ from dmoc.scene.problem import TransferProblem
 
 # The attitude of a body of which neither end says how it is turned.
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
-# The guess is bent off the axis of the turn by this angle [rad]. A turn about a principal axis is stationary but
-# need not be cheapest: in least time it is up to a tenth slower than the fastest (K. D. Bilimoria, B. Wie, J.
-# Guid. Control Dyn. 16, 1993), by the least effort a body tilts, to turn about an axis of less inertia.
+# The guess is bent off the axis of the turn by this angle [rad]. A turn about a principal axis is stationary,
+# though it need not be cheapest: in least time it is up to a tenth slower than the fastest (K. D. Bilimoria,
+# B. Wie, J. Guid. Control Dyn. 16, 1993), by the least effort a body tilts to an axis of less inertia.
 BENT = 0.6
 # A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
 LEISURE = 1.2

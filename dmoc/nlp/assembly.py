@@ -9,7 +9,7 @@ over the evaluations, and nothing here knows mechanics.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -132,6 +132,21 @@ class Assembly:
     gradient: ca.Function
     jacobian: ca.Function
     hessian: ca.Function
+
+    def leaning(self, place: np.ndarray, weight: np.ndarray) -> Assembly:
+        """The same NLP whose objective has half the weighted sum of squares of x - place as a further term."""
+        x, p, away, sparse = self.x, self.p, self.x - place, ca.sparsify(ca.DM(weight))
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.g.numel())
+        slopes = self.gradient(x, p)[1] + sparse * away
+        hessian = self.hessian(x, p, lam_f, lam_g) + lam_f * ca.diag(sparse)
+        return replace(
+            self,
+            f=self.f + 0.5 * ca.dot(sparse * away, away),
+            gradient=ca.Function("nlp_grad_f", [x, p], [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
+            hessian=ca.Function(
+                "nlp_hess_l", [x, p, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]
+            ),
+        )
 
 
 def assemble(

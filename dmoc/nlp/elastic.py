@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import ALWAYS, run
+from dmoc.nlp.ipopt import ALWAYS, Interrupt, Watch, run
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
@@ -40,12 +40,16 @@ WARM = {
 
 @dataclass(frozen=True)
 class Relaxed:
-    """The answer of one elastic NLP: the slacks, the path, and whether it keeps all rows with these slacks."""
+    """The answer of one elastic NLP: the slacks, the path, and whether it keeps all rows with these slacks.
+
+    The slacks are the least ones if it is `exact`, else they are enough.
+    """
 
     slack: np.ndarray
     path: DiscretePath
     feasible: bool
     multipliers: dict[str, Any] = field(default_factory=dict)
+    exact: bool = True
 
 
 class Relaxation:
@@ -68,6 +72,8 @@ class Relaxation:
         How far the lower and the upper limits of these unknowns give way for a slack of 1, scaled.
     tell : callable
         Takes the `Level` of every run.
+    interrupt : Interrupt, optional
+        Ends a run, which then counts as one that found nothing.
     """
 
     def __init__(
@@ -79,6 +85,7 @@ class Relaxation:
         above=(),
         least: float = 0.0,
         tell: Callable[[Level], None] = lambda level: None,
+        interrupt: Interrupt | None = None,
     ):
         begun = time.perf_counter()
         self.nlp, self.least, self.count, self.tell = nlp, least, rows.shape[1], tell
@@ -91,6 +98,10 @@ class Relaxation:
         share = np.zeros((2 * number, self.count))
         share[:, 0] = np.concatenate([-np.asarray(above, float), np.asarray(below, float)])
         nlp_parts, settings = self._parts(_sparse(rows), ca.vertcat(pick, pick), _sparse(share))
+        # CasADi holds no reference to its callbacks.
+        sizes = [nlp_parts[name].numel() for name in ("x", "g", "p")]
+        self._watch = Watch(sizes[0], sizes[1], sizes[2], None, interrupt or Interrupt())
+        settings |= {"iteration_callback": self._watch}
         self.solver = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings)
         self.warm = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings | WARM)
         self._built = time.perf_counter() - begun
@@ -150,7 +161,8 @@ class Relaxation:
         excess = np.maximum(bounds["lbg"] - g, g - bounds["ubg"]).max(initial=0.0)
         path = self.nlp.unpack(z[: -self.count], problem)
         multipliers = {"lam_x0": found.lam_x, "lam_g0": found.lam_g}
-        return Relaxed(z[-self.count :], path, bool(np.isfinite(z).all() and excess <= MET), multipliers)
+        feasible = bool(np.isfinite(z).all() and excess <= MET)
+        return Relaxed(z[-self.count :], path, feasible, multipliers, found.status == "solved")
 
 
 def _sparse(matrix: np.ndarray) -> ca.DM:

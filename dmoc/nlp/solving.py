@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -13,6 +13,7 @@ import numpy as np
 from dmoc.basics.arguments import of_kind
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.march import force_of
+from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
@@ -23,6 +24,9 @@ from dmoc.results.facts import Level, Provenance
 from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
+# A path that answers are to stay near holds their positions so many times as strongly as their controls [-]:
+# positions are the sums of sums of the controls, and change far less.
+OF_POSITIONS = 10.0
 # A user's function that follows a solve takes (order, steps, iteration, objective, name of the worst row, its
 # scaled violation) and says whether to stop.
 Progress = Callable[[int, int, int, float, str, float], bool | None]
@@ -48,6 +52,30 @@ class NLP(Program):
         curved = self.chart is not None
         settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried, curved)
         return make_solver(self.assembly, settings, options, watch)
+
+    def leaning(self, path: DiscretePath, strength: float) -> NLP:
+        """The same NLP, whose scaled objective grows with the distance to a path on its mesh.
+
+        Half of the mean square is added, times `strength` for the controls and `OF_POSITIONS` times that for
+        the positions.
+        Where many paths cost the same the one next to the given path is the optimum, and Ipopt does not wander.
+        """
+        weight = self._weights(strength)
+        return replace(self, assembly=self.assembly.leaning(self.pack(path), weight))
+
+    def pull(self, path: DiscretePath, near: DiscretePath, strength: float) -> float:
+        """The largest scaled gradient, over its weight, by which an answer of `leaning` is no optimum [-]."""
+        moved = self.pack(path) - self.pack(near)
+        gradient = self._weights(strength) * moved
+        positions = np.abs(np.cumsum(self.columns["position"].of(gradient), axis=0)).max()
+        controls = np.abs(self.columns["force"].of(moved)).max(initial=0.0)
+        return float(max(positions, strength * controls))
+
+    def _weights(self, strength: float) -> np.ndarray:
+        weight, nodes = np.zeros(self.columns.size), node_weights(self.mesh, self.scheme)
+        weight[self.columns["position"].indices] = OF_POSITIONS * strength * nodes
+        weight[self.columns["force"].indices] = strength * (np.diff(self.mesh) if self.hold else nodes)
+        return weight
 
     def watch(self, problem: TransferProblem, progress: Progress | None, interrupt: Interrupt) -> Watch:
         """A watch over the iterations that tells `progress` of each in the problem's own words."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
-import casadi as ca
 import numpy as np
 
-from dmoc.basics.memory import remembered
-from dmoc.motion.configuration import configuration_of, places_in, speeds_in
-from dmoc.motion.dynamics import state_symbols
+from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.results.flown_cost import cost_functions
 from dmoc.scene.problem import TransferProblem
 
 # The size of the objective is estimated from this many nodes: more do not change its first digit.
@@ -74,7 +71,10 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     force = max(force, LEAST_SHARE * typical) if force else typical
     torque = _torque(problem, guess, force * length)
     sizes = np.where(forces, force, torque)
-    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, sizes))) or 1.0
+    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, sizes)))
+    # All nozzles at once make no force, one of them does.
+    alone = sizes * (np.arange(len(sizes)) == 0)
+    cost = cost or abs(cost_along(problem, guess, alone)) or 1.0
     return Units(length, time, force, problem.mass, cost, torque, origin)
 
 
@@ -88,9 +88,8 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)])
     used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
     scales = path_scales(guess)
-    typical = (
-        float(np.trace(problem.inertia)) / 3 * max(scales.turn / guess.duration, scales.rate) / guess.duration
-    )
+    moment, fastest = float(np.trace(problem.inertia)) / 3, max(scales.turn / guess.duration, scales.rate)
+    typical = moment * fastest / guess.duration
     limit = problem.actuator.torque_limit()
     if limit is not None:
         used = min(max(used, LEAST_SHARE * limit), limit) if used else limit
@@ -103,8 +102,7 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, instead: np.ndarra
     A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
     node it grows with the number of steps, so at the ends no more counts than the largest force in between.
     """
-    parts = configuration_of(problem), problem.objective, problem.actuator
-    rate, terminal = remembered(partial(_cost_functions, problem), "cost", *parts)
+    rate, terminal = cost_functions(problem)
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
     times = problem.start_time + guess.duration * guess.fractions[some]
     velocity = np.gradient(guess.place[some], times, axis=0)
@@ -118,12 +116,3 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, instead: np.ndarra
     last = guess.goal_velocity[speeds_in(guess.parts)]
     end = terminal(times[-1], guess.place[-1], last, guess.mass[-1])
     return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
-
-
-def _cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
-    """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
-    t, q, v, m = state_symbols(places_in(configuration_of(problem).blocks).sum())
-    u = ca.SX.sym("u", problem.controls)
-    rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
-    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
-    return ca.Function("rate", [t, q, v, u, m], [rate]), terminal

@@ -16,14 +16,12 @@ from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.step import step_map
 from dmoc.results.facts import Error
+from dmoc.results.flown_cost import TINY, unpriced
 from dmoc.scene.problem import TransferProblem
 
 # The error is taken to fall by at least this factor [-] from mesh to mesh: the error that is left, the change
 # over the factor less 1, would have no bound otherwise.
 LEAST_FALL = 1.5
-# An objective of 0 is replaced by this, the smallest number of full precision, before something is divided by
-# it.
-TINY = float(np.finfo(float).tiny)
 
 
 def change(
@@ -42,6 +40,7 @@ def estimate(
     problem: TransferProblem,
     dynamics: Dynamics,
     path: DiscretePath,
+    objective: float,
     changes: list[tuple[float, float]],
     most: float,
 ) -> Error:
@@ -53,14 +52,14 @@ def estimate(
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
     missed = path_scales(path).share(*goal_miss(dynamics, path, problem.start_time))
-    cost += idle_share(dynamics, path)
+    cost += idle_share(dynamics, path) + unpriced(problem, dynamics, path, objective)
     return Error(moved, cost, missed)
 
 
 def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
     """The part of the impulse that is paid for and not flown [-]: in a step where a control switches.
 
-    Zero where no throttle among the controls is paid for in place of the force itself.
+    Zero where no throttle among the controls stands for |F|: the thrust of nozzles is flown as it is paid for.
     """
     if path.hold or dynamics.actuator.smoothing is None:
         return 0.0

@@ -38,6 +38,11 @@ def is_singular(problem: TransferProblem, path: DiscretePath) -> bool:
     return bool(inside.sum() > BETWEEN * len(inside))
 
 
+def has_linear_controls(problem: TransferProblem) -> bool:
+    """Whether the cost is linear in controls that have limits: then many paths may cost the same."""
+    return bool(_linear(problem, problem.controls).any())
+
+
 def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """When a control that the cost is linear in passes the middle between its limits [s]."""
     fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
@@ -50,11 +55,17 @@ def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
 
 def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
-    u = ca.SX.sym("u", path.control.shape[1])
+    lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
+    limited = _linear(problem, path.control.shape[1])
+    return (path.control - lower)[:, limited] / (upper - lower)[limited]
+
+
+def _linear(problem: TransferProblem, size: int) -> np.ndarray:
+    """Which controls have limits on both sides and a cost that is linear in them."""
+    u = ca.SX.sym("u", size)
     rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    limited = np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
-    return (path.control - lower)[:, limited] / (upper - lower)[limited]
+    return np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
 
 
 def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
+from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
@@ -18,6 +19,14 @@ from dmoc.solver.relaxable import LEAST, Relaxable
 # A limit is far off if the guess takes more than this many times as much on average [-]: in units of such a
 # limit the slacks are so large that no solver finds them.
 FAR_OFF = 10.0
+# The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: a little may be due
+# to the mesh, and a finer one is then worth its time.
+HOPELESS = 0.05
+# A mesh is to blame if less than this part of the excess is sure to be left on ever shorter steps [-]: of one
+# that is due to the mesh nothing is left or, where burns are shorter than steps, up to 0.45; of a true one 0.9.
+SURE = 0.5
+# The mesh is asked for its share on guesses of up to this many nodes: finer ones are hardly to blame.
+MOST_CONFIRMED = 500
 # At most this many zones are relaxed, each alone, to find the one that is in the way.
 MOST_ZONES = 8
 # At most this many rows that cannot be met together are named, the worst first: a message must stay short.
@@ -43,6 +52,8 @@ class Cause:
         to blame.
     zones : bool
         Whether zones are in the way, of which each alone would have to give way.
+    coarse : bool
+        Whether twice as many steps need so much less that the mesh may be to blame, and not the problem.
     """
 
     path: DiscretePath | None = None
@@ -50,24 +61,56 @@ class Cause:
     rows: tuple[str, ...] = ()
     excess: float = np.inf
     zones: bool = False
+    coarse: bool = False
 
-    def words(self) -> str:
-        """One line for a person; empty if nothing was found."""
+    @property
+    def hopeless(self) -> bool:
+        """Whether no finer mesh can help."""
+        return HOPELESS < self.excess < np.inf and not self.coarse
+
+    def words(self, local: bool = False) -> str:
+        """One line for a person; empty if nothing was found. `local` if other guesses may well need less."""
         parts = []
         if self.needs:
-            parts.append(f"the transfer needs {', or '.join(self.needs)}")
+            where = "with steps as long as these " if self.coarse else ""
+            what = "a path near the guess" if local else "the transfer"
+            parts.append(f"{where}{what} needs {', or '.join(self.needs)}")
         if self.rows:
             parts.append(f"these rows cannot be met together: {', '.join(self.rows)}")
         return "; ".join(parts)
 
 
-def cause_of(problem: TransferProblem, guess: DiscretePath, tell: Callable[[Level], None]) -> Cause:
+def confirmed_cause(
+    problem: TransferProblem, guess: DiscretePath, tell: Callable[[Level], None], interrupt: Interrupt
+) -> Cause:
+    """As `cause_of`; where more than the limits is needed, a mesh of twice the steps tells if that is to blame.
+
+    A ramp or a burn that is shorter than a step takes a larger force there. The excess falls with the length of
+    the steps at least, so that on ever shorter ones at least 2 e2 - e1 is left of excesses e1 and e2.
+    """
+    cause = cause_of(problem, guess, tell, interrupt)
+    if not 0 < cause.excess <= FAR_OFF or len(guess.position) > MOST_CONFIRMED:
+        return cause
+    finer = np.sort(np.append(guess.mesh, 0.5 * (guess.mesh[1:] + guess.mesh[:-1])))
+    again = cause_of(problem, guess.onto(finer, guess.order, guess.hold), tell, interrupt, brief=True)
+    left = 2 * again.excess - cause.excess
+    return replace(cause, coarse=again.path is not None or left < SURE * cause.excess)
+
+
+def cause_of(
+    problem: TransferProblem,
+    guess: DiscretePath,
+    tell: Callable[[Level], None],
+    interrupt: Interrupt,
+    brief: bool = False,
+) -> Cause:
     """Why there is no path near a guess, found on its mesh: limits relaxed one by one, then every row.
 
-    `tell` takes the `Level` of every run.
+    `tell` takes the `Level` of every run; once `interrupt` has seen something, nothing is found any more. If
+    `brief`, no durations and no single limits are looked for.
     """
-    transfer = Relaxable(problem, guess, tell)
-    if (far := _far_off(transfer)) is not None:
+    transfer = Relaxable(problem, guess, tell, interrupt)
+    if (far := _far_off(transfer, brief)) is not None:
         return far
     limits = transfer.limits()
     if not limits:
@@ -80,16 +123,18 @@ def cause_of(problem: TransferProblem, guess: DiscretePath, tell: Callable[[Leve
         return _zones(transfer) or _rows(transfer)
     if found.slack[0] <= MET:
         return Cause(path=found.path)
+    if brief:
+        return Cause(excess=float(found.slack[0]))
     needs = []
     for limit in limits:
-        alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        if alone.feasible:
-            needs.append(limit.told(alone.slack[0]))
+        alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, found.path)
+        if alone.feasible and (words := limit.told(alone.slack[0])):
+            needs.append(words if alone.exact else f"{words}, which is more than enough")
     needs += transfer.durations(joint, found, transfer.problem.duration_bounds[0])
     return Cause(needs=tuple(needs), excess=float(found.slack[0])) if needs else _rows(transfer)
 
 
-def _far_off(transfer: Relaxable) -> Cause | None:
+def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
     """The limits that are enough, where those given are too small by orders of magnitude; else None.
 
     They are found in units of the force and the speed that the guess takes: in units of the limits given the
@@ -102,7 +147,7 @@ def _far_off(transfer: Relaxable) -> Cause | None:
     problem, longest = transfer.problem, transfer.problem.duration_bounds[1]
     wider = tuple(part.times(speed) if part.limits_speed else part for part in problem.constraints)
     raised = replace(problem, actuator=problem.actuator.times(force), constraints=wider)
-    higher = Relaxable(raised, transfer.guess, transfer.tell, given=problem)
+    higher = Relaxable(raised, transfer.guess, transfer.tell, transfer.interrupt, given=problem)
     pairs = ((higher.force(), force), (higher.speed(), speed))
     limits = [limit for limit, ratio in pairs if limit and ratio > 1]
     found = higher.relaxed(*limits, least=LEAST)(raised, higher.guess)
@@ -111,13 +156,16 @@ def _far_off(transfer: Relaxable) -> Cause | None:
     # The guess may take so much more than is needed that even the least slack is more than enough.
     if higher.leaps(found.path) or found.slack[0] < 0.99 * LEAST:
         return None
+    excess = max(limit.factor(found.slack[0]) for limit in limits)
+    if brief:
+        return Cause(excess=excess)
     needs = [" and ".join(limit.told(found.slack[0]) for limit in limits)]
     longer = longest * max(limit.factor(found.slack[0]) ** (1 / limit.falls) for limit in limits)
-    later = Relaxable(replace(problem, duration=longer), transfer.guess, transfer.tell)
+    later = Relaxable(replace(problem, duration=longer), transfer.guess, transfer.tell, transfer.interrupt)
     joint = later.relaxed(*later.limits(), least=LEAST)
     near = joint(later.problem, later.guess)
     needs += later.durations(joint, near, longest) if near.feasible else []
-    return Cause(needs=tuple(needs), excess=max(limit.factor(found.slack[0]) for limit in limits))
+    return Cause(needs=tuple(needs), excess=excess)
 
 
 def _unlimited(transfer: Relaxable) -> Cause | None:
@@ -128,7 +176,8 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
         return None
     problem = replace(transfer.problem, actuator=free, constraints=transfer.given.constraints)
     nlp = transcribe_onto(problem, transfer.guess, units_of(problem, transfer.guess))
-    answer = nlp.run(nlp.solver({"ipopt.max_iter": MOST_ITERATIONS}), problem, transfer.guess)
+    watch = nlp.watch(problem, None, transfer.interrupt)
+    answer = nlp.run(nlp.solver({"ipopt.max_iter": MOST_ITERATIONS}, watch=watch), problem, transfer.guess)
     transfer.tell(replace(nlp.level(answer, 0.0), question="least effort without a limit"))
     path = replace(nlp.path(problem, answer), multipliers={})
     if answer.status != "solved" or transfer.leaps(path):
@@ -145,7 +194,8 @@ def _rows(transfer: Relaxable) -> Cause:
     """Every row made elastic: the rows that cannot be met, or the constraint that alone is in the way."""
     layout = transfer.nlp.rows
     slacks = np.hstack([np.eye(layout.size), -np.eye(layout.size)])
-    found = Relaxation(transfer.nlp, slacks, tell=transfer.tell)(transfer.problem, transfer.guess)
+    relaxed = Relaxation(transfer.nlp, slacks, tell=transfer.tell, interrupt=transfer.interrupt)
+    found = relaxed(transfer.problem, transfer.guess)
     if not found.feasible:
         return Cause()
     miss = np.abs(found.slack[: layout.size] - found.slack[layout.size :])
@@ -167,3 +217,13 @@ def _zones(transfer: Relaxable) -> Cause | None:
             needs.append(words)
             excess = max(excess, float(found.slack[0]))
     return Cause(needs=tuple(needs), excess=excess, zones=True) if needs else None
+
+
+def idle_share(problem: TransferProblem) -> float:
+    """The part of the propellant that an engine burns at rest, since |F| is rounded at zero [-]."""
+    engine, duration = problem.actuator, problem.duration_bounds[1]
+    if engine.smoothing is None or not engine.burns:
+        return 0.0
+    controls = np.zeros(problem.controls)
+    controls[-1] = engine.smoothing * (engine.force_limit() or 0.0)
+    return float(engine.flow(controls)) * duration / (problem.mass - engine.dry_mass)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,28 +22,24 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.cause import Cause, cause_of
+from dmoc.solver.cause import Cause, confirmed_cause, idle_share
 from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung
+from dmoc.solver.rung import Rung, answered, held_answer, rounded
 
-# The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: the error of the
-# mesh is far smaller, so a finer one cannot help.
-HOPELESS = 0.05
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
 # A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
 LEAST_HALVED = 9
-# Where a transfer of free duration fails, it is tried again from a guess that lasts this many times as long:
-# the first one may have been too short.
+# Where a transfer of free duration fails, its guess may be too short: another one lasts so many times as long.
 LONGER = 10
-# An attempt that is one of several ways to an answer ends after this many iterations: those that get there take
-# 20 to 130, and what takes longer wanders.
+# Where it was as long as may be, so many shorter durations are tried.
+SOONER = 2
+# One of several attempts ends after this many iterations: those that get there take 20 to 130, others wander.
 MOST_TRYING = 150
 # A refinement of a mesh ends after this many iterations, and then each other way to it after the number above.
 MOST_REFINING = 300
-# On the way to a path that a wide rounding of |F| would find sooner, |F| is first rounded this many times as
-# wide.
+# On the way to a path that a wide rounding of |F| would find sooner, it is first this many times as wide.
 WIDER = 10.0
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
@@ -92,9 +89,8 @@ class Ladder:
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
-            cause = rung.cause
-            hopeless = cause is not None and HOPELESS < cause.excess < np.inf
-            if rung.stopped or (not rung.solved and hopeless):
+            cause = None if rung.cause is None or rung.cause.coarse else rung.cause
+            if rung.stopped or (not rung.solved and cause is not None and cause.hopeless):
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first
@@ -114,6 +110,8 @@ class Ladder:
         rung = self._explained(rung, start, rounding, known)
         if not quick or not self._unexplained(rung):
             return rung
+        if (held := held_answer(self.problem, partial(self.try_on, rounding=rounding), start)) is not None:
+            return replace(held, cause=rung.cause)
         return replace(self._solved_sooner_or_later(start, first, rounding), cause=rung.cause)
 
     def _solved_sooner_or_later(
@@ -123,8 +121,17 @@ class Ladder:
         rung = self.solve_on(start, rounding, most)
         if rung.solved or rung.stopped or not self.problem.free_duration:
             return rung
-        longer = min(self.problem.duration_bounds[1], LONGER * first.duration)
-        return self.solve_on(replace(first, duration=longer), rounding, most)
+        shortest, longest = self.problem.duration_bounds
+        if first.duration < longest:
+            longer = min(longest, LONGER * first.duration)
+            return self.solve_on(replace(first, duration=longer), rounding, most)
+        # The first guess was as long as may be: a target that moves may be met sooner.
+        for duration in np.geomspace(shortest, longest, 2 + SOONER)[-2:0:-1]:
+            guess = starting_guess(self.problem, first.mesh, first.order, first.hold, None, duration)
+            sooner = self.solve_on(guess, rounding, most)
+            if sooner.solved or sooner.stopped:
+                return sooner
+        return rung
 
     def _unexplained(self, rung: Rung) -> bool:
         """Whether an attempt failed without a reason; one that the user cut short has a reason."""
@@ -147,9 +154,13 @@ class Ladder:
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
-        cause = cause_of(self._rounded(rounding), start, self._levels.append)
+        problem = rounded(self.problem, rounding)
+        cause = confirmed_cause(problem, start, self._levels.append, self.interrupt)
+        if self.interrupt.seen:
+            return replace(rung, answer=replace(rung.answer, status="stopped"))
         if cause.path is None:
-            return replace(rung, cause=cause)
+            coarse = cause.coarse or cause.excess < idle_share(problem) - idle_share(self.problem)
+            return replace(rung, cause=replace(cause, coarse=coarse))
         return self.solve_on(cause.path, rounding, MOST_TRYING)
 
     def try_on(
@@ -158,9 +169,15 @@ class Ladder:
         rounding: float | None = None,
         most: int = MOST_TRYING,
         pinned: bool = False,
+        lean: float = 0.0,
     ) -> Rung:
-        """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration."""
-        return self._attempt(guess, self._rounded(rounding), {"ipopt.max_iter": most}, pinned=pinned)
+        """One attempt of at most so many iterations, to see where a guess leads; `pinned` in its duration.
+
+        With `lean` the answer is held near the guess, as strongly as `NLP.leaning` says.
+        """
+        return self._attempt(
+            guess, rounded(self.problem, rounding), {"ipopt.max_iter": most}, pinned=pinned, lean=lean
+        )
 
     def ask(
         self, problem: TransferProblem, guess: DiscretePath, question: str, most: int = MOST_TRYING
@@ -168,12 +185,13 @@ class Ladder:
         """One attempt of few iterations at another problem, whose answer helps; `question` says what it is."""
         return self._attempt(guess, problem, {"ipopt.max_iter": most}, question=question)
 
-    def refine_on(self, guess: DiscretePath, pinned: bool = False) -> Rung:
+    def refine_on(self, guess: DiscretePath, pinned: bool = False, lean: float = 0.0) -> Rung:
         """Solve on a finer mesh from the answer on a coarser one, in a few hundred iterations or not at all.
 
         Where equally good paths differ in their duration Ipopt wanders from one to the other: what fails is
         tried again with the duration `pinned` to that of the coarser mesh, and with a wider rounding of |F| on
-        the way. Pinned from the outset, the free duration comes last.
+        the way. Pinned from the outset, the free duration comes last. `lean` is how strongly an answer is held
+        near the guess.
         """
         rounding = self.problem.actuator.smoothing
         by_way: list[float | None] = [None] if rounding is None else [WIDER * rounding, None]
@@ -185,7 +203,7 @@ class Ladder:
             start = guess
             for width in widths:
                 most = MOST_TRYING if pin or width else MOST_REFINING
-                rung = self.try_on(start, width, most, pin)
+                rung = self.try_on(start, width, most, pin, lean)
                 start = rung.path if rung.solved else start
             if rung.stopped or rung.solved:
                 break
@@ -196,11 +214,15 @@ class Ladder:
 
         A warm start that fails is tried again cold.
         """
-        problem, limits = self._rounded(rounding), {} if most is None else {"ipopt.max_iter": most}
+        problem, limits = rounded(self.problem, rounding), {} if most is None else {"ipopt.max_iter": most}
         if guess.multipliers:
-            warm = self._attempt(guess, problem, limits)
+            # What takes longer from an answer near by wanders among paths that cost the same.
+            few = {} if problem.actuator.smoothing is None else {"ipopt.max_iter": MOST_TRYING}
+            warm = self._attempt(guess, problem, few | limits)
             if warm.solved or warm.stopped:
                 return warm
+            if few and (held := held_answer(self.problem, partial(self.try_on, rounding=rounding), guess)):
+                return held
             guess = replace(guess, multipliers={})
         # In the unknowns of a chart Ipopt does not leave the guess for other revolutions.
         near = None if is_curved(problem, guess) else in_tube(problem, guess)
@@ -215,6 +237,7 @@ class Ladder:
         limits: dict[str, Any] | None = None,
         question: str = "",
         pinned: bool = False,
+        lean: float = 0.0,
     ) -> Rung:
         answers = [one for one in self._rungs if not one.level.question]
         last = answers[-1] if answers else None
@@ -228,29 +251,21 @@ class Ladder:
         if last is None:
             refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
-        solver = nlp.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
+        asked_of = nlp.leaning(guess, lean) if lean else nlp
+        solver = asked_of.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
         built = time.perf_counter() - begun
         answer = nlp.run(solver, problem, guess, pinned)
+        if lean:
+            true = float(nlp.assembly.objective(answer.x, nlp.parameters(problem)))
+            answer = replace(answer, objective=true)
         if watch.error is not None:
             raise watch.error
         level = replace(nlp.level(answer, built), question=question)
-        asked = problem if question else self._asked(problem)
-        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned))
+        asked = problem if question else answered(self.problem, problem)
+        pull = nlp.pull(nlp.unpack(answer.x, problem), guess, lean) if lean else 0.0
+        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull))
         self._levels.append(level)
         return self._rungs[-1]
-
-    def _asked(self, problem: TransferProblem) -> TransferProblem:
-        """The problem that an attempt answers: as asked for, or with |F| rounded less."""
-        asked, used = self.problem.actuator.smoothing, problem.actuator.smoothing
-        sharper = asked is not None and used is not None and used < asked
-        return replace(self.problem, actuator=problem.actuator) if sharper else self.problem
-
-    def _rounded(self, rounding: float | None) -> TransferProblem:
-        """The problem with this rounding of |F| at zero."""
-        if rounding is None:
-            return self.problem
-        engine: Any = self.problem.actuator
-        return replace(self.problem, actuator=replace(engine, smoothing=rounding))
 
     def solution(self, rung: Rung, errors: dict[int, float] | None = None, **found: Any) -> Solution:
         """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung.
@@ -261,7 +276,9 @@ class Ladder:
             return self._out_of_time(rung, errors, **found)
         known = errors or {}
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
-        reason = "" if rung.cause is None else rung.cause.words()
+        # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
+        local = self.problem.attraction.first is not None and self.problem.attraction.lone is None
+        reason = "" if rung.cause is None else rung.cause.words(local)
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}

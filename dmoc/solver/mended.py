@@ -10,11 +10,13 @@ import numpy as np
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.configuration import speeds_in
+from dmoc.motion.flown import flown
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.motion.reference import MISSED, goal_miss
 from dmoc.results.between import Cut, cuts
-from dmoc.solver.ladder import HOPELESS, UNEXPLAINED, Ladder
+from dmoc.results.flown_cost import unpriced
+from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.meshes import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
 from dmoc.solver.rung import Rung
 
@@ -23,6 +25,9 @@ MOST_WAYS = 8
 # A mesh on which a zone is cut, or the goal missed, is made finer at most this many times: with twice the steps
 # each time that leaves an eighth of their length.
 MOST_FINER = 3
+# A step whose control is flown at another price than it was planned is cut into this many parts: its share of
+# the cost falls with its length.
+PARTS = 4
 # An answer that cuts a zone leaps it if it costs this part more or less on steps of half the length [-]: what
 # only grazes a zone there costs a thousandth more, and a leap ten times as much, as it has half the time.
 ANOTHER = 0.05
@@ -73,11 +78,24 @@ def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refi
     return min([rung, *found], key=lambda one: _deepest(ladder, one))
 
 
+def on_shorter_steps(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any) -> tuple[Rung, DiscretePath]:
+    """An answer, or why there is none, on steps so short that they are not to blame; and the guess on them."""
+    steps = len(first.mesh) - 1
+    for _ in range(MOST_FINER):
+        if rung.solved or rung.stopped or rung.cause is None or not rung.cause.coarse:
+            break
+        steps *= 2
+        first = trial_path(ladder.problem, first.order, steps, first.hold, given)
+        rung = ladder.climb_to(first, given)
+    return rung, first
+
+
 def _grazed(ladder: Ladder, rung: Rung) -> tuple[Rung, bool]:
     """The answer with the steps that cut a zone in two; whether that makes it clear at about the same cost."""
     for _ in range(MOST_FINER):
         path, before = rung.path, _cost(rung)
-        finer = ladder.refine_on(path.onto(_halved(path.mesh, _cuts(ladder, rung)), path.order, path.hold))
+        mesh = _shortened(path.mesh, _steps(_cuts(ladder, rung)))
+        finer = ladder.refine_on(path.onto(mesh, path.order, path.hold))
         if not finer.solved:
             return finer if finer.stopped else rung, False
         rung = finer
@@ -106,7 +124,8 @@ def _cleared(ladder: Ladder, rung: Rung, first: DiscretePath, refined: bool) -> 
     for _ in range(MOST_FINER if refined else 0):
         if not (left := _cuts(ladder, rung)):
             break
-        finer = ladder.refine_on(rung.path.onto(_halved(rung.path.mesh, left), first.order, first.hold))
+        mesh = _shortened(rung.path.mesh, _steps(left))
+        finer = ladder.refine_on(rung.path.onto(mesh, first.order, first.hold))
         if not finer.solved:
             return finer if finer.stopped else rung
         rung = finer
@@ -144,6 +163,29 @@ def onto_goal(
     return rung if len(rung.nlp.mesh) <= len(first.mesh) else _noted(rung, MADE_FINER)
 
 
+def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
+    """An answer whose objective is what the control costs that is flown.
+
+    A step in which the polynomial through its nodes breaks the limit of the actuator is flown in two pieces of
+    another price: such steps are cut in four, if need be more than once.
+    """
+    begun = rung
+    for _ in range(MOST_FINER):
+        if not rung.solved or _unpriced(ladder, rung) <= MISSED:
+            break
+        path, broken = rung.path, flown(ladder.dynamics, rung.path).broken
+        mesh = _shortened(path.mesh, np.flatnonzero(broken), PARTS)
+        finer = ladder.refine_on(path.onto(mesh, path.order, path.hold), pinned)
+        if not finer.solved:
+            return finer if finer.stopped else rung
+        rung = finer
+    return rung if rung is begun or MADE_FINER in rung.notes else _noted(rung, MADE_FINER)
+
+
+def _unpriced(ladder: Ladder, rung: Rung) -> float:
+    return unpriced(ladder.problem, ladder.dynamics, rung.path, rung.level.objective)
+
+
 def _noted(rung: Rung, note: str) -> Rung:
     return replace(rung, notes=(*rung.notes, note))
 
@@ -179,7 +221,7 @@ def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
     if rung.answer.status not in UNEXPLAINED or any("max_" in name for name in ladder.options or ()):
         return False
     cause = rung.cause
-    return cause is None or cause.zones or not HOPELESS < cause.excess < np.inf
+    return cause is None or cause.zones or not cause.hopeless
 
 
 def _deepest(ladder: Ladder, rung: Rung) -> float:
@@ -216,8 +258,14 @@ def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, fl
     )
 
 
-def _halved(mesh: np.ndarray, left: list[Cut]) -> np.ndarray:
-    """The mesh with the steps that cut a zone, and their neighbours, cut in two."""
-    steps = np.unique(np.concatenate([cut.steps for cut in left])[:, None] + [-1, 0, 1])
+def _steps(left: list[Cut]) -> np.ndarray:
+    """The steps that cut a zone."""
+    return np.concatenate([cut.steps for cut in left])
+
+
+def _shortened(mesh: np.ndarray, steps: np.ndarray, parts: int = 2) -> np.ndarray:
+    """The mesh with some steps and their neighbours cut into so many parts."""
+    steps = np.unique(steps[:, None] + [-1, 0, 1])
     steps = steps[(steps >= 0) & (steps < len(mesh) - 1)]
-    return np.sort(np.append(mesh, 0.5 * (mesh[steps] + mesh[steps + 1])))
+    places = mesh[steps, None] + np.diff(mesh)[steps, None] * np.arange(1, parts) / parts
+    return np.sort(np.append(mesh, places))

@@ -10,6 +10,7 @@ import numpy as np
 from dmoc.basics.digits import down, time_unit, up
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import Relaxation, Relaxed
+from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import transcribe_onto
@@ -56,7 +57,7 @@ class Relaxable:
     """A transfer of fixed duration, on the mesh of a guess, whose objective is the effort.
 
     Limits are told of as those of `given`, which are smaller where they were raised. `tell` takes the `Level`
-    of every run.
+    of every run; `interrupt` ends them.
     """
 
     def __init__(
@@ -64,9 +65,10 @@ class Relaxable:
         problem: TransferProblem,
         guess: DiscretePath,
         tell: Callable[[Level], None],
+        interrupt: Interrupt,
         given: TransferProblem | None = None,
     ):
-        self.tell = tell
+        self.tell, self.interrupt = tell, interrupt
         longest = problem.duration_bounds[1]
         self.given, self.guess = given or problem, replace(guess, duration=longest, multipliers={})
         self.problem = replace(problem, duration=longest, objective=Effort())
@@ -81,7 +83,7 @@ class Relaxable:
         columns, below, above = (
             np.concatenate([getattr(limit, name) for limit in limits]) for name in ("columns", "below", "above")
         )
-        return Relaxation(self.nlp, rows, columns, below, above, least, self.tell)
+        return Relaxation(self.nlp, rows, columns, below, above, least, self.tell, self.interrupt)
 
     def taken(self) -> tuple[float, float]:
         """Mean force and mean speed along the guess over their limits [-]; 0 without a limit.
@@ -98,7 +100,7 @@ class Relaxable:
 
     def limits(self) -> list[Giving]:
         """The limits that a longer duration eases."""
-        return [limit for limit in (self.force(), self.speed()) if limit is not None]
+        return [limit for limit in (self.force(), self.speed(), self.propellant()) if limit is not None]
 
     def force(self) -> Giving | None:
         """The limit of the actuator."""
@@ -134,6 +136,22 @@ class Relaxable:
             return (eased.largest_speed() or 0.0) / (given.largest_speed() or 1.0) if eased else np.inf
 
         return self._giving(told, factor, [group for group in self._groups() if self._limits_speed(group)])
+
+    def propellant(self) -> Giving | None:
+        """The dry mass, which gives way downwards: at a slack of 1 there is twice the propellant."""
+        dry = self.problem.actuator.dry_mass
+        load = self.problem.mass - dry
+        if not self.problem.actuator.burns or dry <= 0:
+            return None
+
+        def told(slack: float) -> str:
+            needed = dry - slack * load
+            return f"a dry mass of {down(needed)} kg (you gave {dry:g} kg)" if needed > 0 else ""
+
+        # The mass at the start is given and stays.
+        columns = self.nlp.columns["mass"].indices.ravel()[1:]
+        below, none = self.bounds[0][columns] * load / dry, np.empty(0, int)
+        return Giving(told, lambda slack: 1 + slack, 1, none, none, columns, below, np.zeros(len(columns)))
 
     def zones(self) -> list[Giving]:
         """The constraints that no longer duration eases, each by itself."""

@@ -40,6 +40,8 @@ SOUNDING_STEPS = 20
 # The duration of the best answer is freed if that may save more than this part of the objective, to first order
 # [-].
 NOTHING_TO_GAIN = 1e-9
+# Where freeing the duration leads nowhere, the path is held as strongly as this [-], one after the other.
+HELD = (1e-2, 1e-4, 1e-6)
 # The problem itself is solved on a coarse mesh from this many of the durations, the most promising ones.
 MOST_SOLVED = 3
 
@@ -87,6 +89,11 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
     if best is None or not best.pinned or best.gain < NOTHING_TO_GAIN:
         return best
     freed = ladder.try_on(best.path)
+    start = best.path
+    for lean in () if freed.solved or freed.stopped else HELD:
+        # Where the duration hardly matters Ipopt wanders off: held near the path it stays.
+        freed = ladder.try_on(start, lean=lean)
+        start = freed.path if freed.solved else start
     return freed if freed.solved else best
 
 

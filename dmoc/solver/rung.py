@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +13,20 @@ from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
+from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.cause import Cause
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
 WORTH_TELLING = 1e-5
+# An answer that was held near its guess is an optimum if it is off one by less than this [-], half of what the
+# check called optimality allows.
+OFF_OPTIMUM = 5e-6
+# Answers are held as strongly as this [-], one after the other: the last one is an optimum wherever it lies.
+HELD = (1e-2, 1e-3, 1e-4, 3e-6)
+# An attempt that is held ends after this many iterations: of four transfers between circles all got there.
+MOST_HOLDING = 200
 
 
 @dataclass(frozen=True)
@@ -24,6 +34,7 @@ class Rung:
     """One attempt on one mesh: the NLP, Ipopt's answer, its place in the ladder, the cause of a failure.
 
     `pinned` says that it kept the duration of its guess, free as that is; `notes` tell a user of the way to it.
+    `pull` is by how much it is no optimum since it was held near its guess [-].
     """
 
     number: int
@@ -34,6 +45,7 @@ class Rung:
     cause: Cause | None = None
     pinned: bool = False
     notes: tuple[str, ...] = ()
+    pull: float = 0.0
 
     @property
     def solved(self) -> bool:
@@ -75,3 +87,34 @@ class Rung:
             told = f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less"
             return (*self.notes, told)
         return self.notes
+
+
+def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:
+    """An optimum by way of answers that are held near the one before, ever less, or None.
+
+    Where many paths cost the same Ipopt wanders among them. Each of these attempts, made by `try_on` from a
+    path with a strength to hold it, begins without multipliers: with them the barrier is so low that a switch
+    moves from node to node.
+    """
+    rung = None
+    for lean in HELD if has_linear_controls(problem) else ():
+        rung = try_on(replace(start, multipliers={}), most=MOST_HOLDING, lean=lean)
+        if rung.stopped:
+            return rung
+        start = rung.path if rung.solved else start
+    return rung if rung is not None and rung.solved and rung.pull <= OFF_OPTIMUM else None
+
+
+def answered(asked: TransferProblem, used: TransferProblem) -> TransferProblem:
+    """The problem that an attempt answers: as asked for, or with |F| rounded less."""
+    wanted, have = asked.actuator.smoothing, used.actuator.smoothing
+    sharper = wanted is not None and have is not None and have < wanted
+    return replace(asked, actuator=used.actuator) if sharper else asked
+
+
+def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:
+    """The problem with this rounding of |F| at zero."""
+    if rounding is None:
+        return problem
+    engine: Any = problem.actuator
+    return replace(problem, actuator=replace(engine, smoothing=rounding))

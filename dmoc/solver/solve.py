@@ -12,7 +12,7 @@ from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.mended import onto_goal, past_zones
+from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
 from dmoc.solver.meshes import first_path
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.starts import compared
@@ -127,8 +127,13 @@ def _solved(
     pinned, given = best is not None and best.pinned, guess
     rung = ladder.climb_to(first, given) if best is None else ladder.refine_on(first, pinned)
     is_open = steps is None and mesh is None
+    if is_open and best is None:
+        rung, first = on_shorter_steps(ladder, rung, first, given)
     rung = past_zones(ladder, rung, first, given, is_open)
-    return ladder.solution(onto_goal(ladder, rung, first, given, order, pinned) if is_open else rung)
+    if is_open:
+        rung = onto_goal(ladder, rung, first, given, order, pinned)
+        rung = onto_price(ladder, rung, pinned)
+    return ladder.solution(rung)
 
 
 def _tolerance(value: Any) -> float:

@@ -10,15 +10,16 @@ import numpy as np
 from dmoc.basics.digits import time_unit
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES
-from dmoc.results.estimate import TINY, change, estimate, local_errors, rounding_cost
+from dmoc.results.estimate import LEAST_FALL, change, estimate, local_errors, rounding_cost
 from dmoc.results.facts import Error
+from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
-from dmoc.results.switches import corners, is_singular, switch_times
+from dmoc.results.switches import corners, has_linear_controls, is_singular, switch_times
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.mended import past_zones
+from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import Rung
+from dmoc.solver.rung import MOST_HOLDING, OFF_OPTIMUM, Rung
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
@@ -39,6 +40,28 @@ MOST_SWITCHES = 12
 # Durations are equally good if, to first order, a change by this part of the duration costs no more than the
 # tolerance.
 EQUALLY_GOOD = 0.1
+# Where the cost is linear in controls and its optimum flat, an answer is held near that on the mesh before, by
+# so many times the tolerance [-]: seven flat optima then met tolerances that none had met.
+HELD = 10.0
+# An answer is held by no more than this [-]: it would keep switches from their places.
+MOST_HELD = 1e-3
+# Paths cost the same if their costs differ by less than this part of the tolerance [-].
+SAME_COST = 0.3
+# Where the change from mesh to mesh falls by less than this factor [-] all steps are cut, and not those alone
+# that make the error of the path: the error of the objective may come from others.
+SLOW = 2.0
+# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-]:
+# elsewhere both change alike.
+FLAT = 0.03
+# A refinement of more iterations than this wanders: others take 20 to 90.
+LONG = 100
+# A refinement that is not held ends after this many iterations: then it is tried anew, and held.
+LONGEST_FREE = 150
+# A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
+TIGHTER = 10.0
+# A mesh does no better if its change is more than this part of the one before [-]: the error that is estimated
+# from the fall of changes goes up and down.
+FALLING = 0.95
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
 
@@ -53,7 +76,8 @@ def climb_to_tolerance(
     the change there tells the error.
     """
     first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
-    trial = past_zones(ladder, ladder.climb_to(first, guess), first, guess, refined=True)
+    trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
+    trial = past_zones(ladder, trial, first, guess, refined=True)
     if not trial.solved:
         return ladder.solution(trial, tolerance=tol)
     path = trial.path
@@ -88,6 +112,7 @@ class _Refinement:
         self.worse = 0
         self.rounded = 0.0
         self.flat = False
+        self.lean, self.linear = 0.0, has_linear_controls(ladder.problem)
 
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
@@ -95,23 +120,46 @@ class _Refinement:
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
-            rung = self.ladder.refine_on(coarse.onto(_cut(coarse.mesh, parts), order, hold), self.flat)
+            rung = self._refined(coarse.onto(_cut(coarse.mesh, parts), order, hold))
             if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
             fine = rung.path
             self.changes.append(change((coarse, cost), (fine, rung.level.objective), parts))
+            self._hold_if_flat(rung)
             if rung.pinned and not self.flat:
                 self.flat = True
                 self.reason += "; durations cost the same, one was kept"
             met = self._judge(rung, fine, most)
+            if met and rung.pull > OFF_OPTIMUM:
+                rung = self._released(rung)
+                self.best = None if rung.pull <= OFF_OPTIMUM else self.best
+                met = self._judge(rung, rung.path, most) and rung.pull <= OFF_OPTIMUM
             if met:
                 self._sharpen(rung, most)
             if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
                 return self._settled(self.reason)
             if self.worse == PATIENCE:
                 return self._settled(f"{self.reason}; finer meshes did no better")
+
+    def _refined(self, start: DiscretePath) -> Rung:
+        """An answer on a finer mesh; where that wanders among paths that cost the same, one that is held."""
+        if self.linear and not self.lean:
+            rung = self.ladder.try_on(start, most=LONGEST_FREE, pinned=self.flat)
+            if rung.solved or rung.stopped:
+                return rung
+            self.lean = min(HELD * self.tol, MOST_HELD)
+        return self.ladder.refine_on(start, self.flat, self.lean)
+
+    def _hold_if_flat(self, rung: Rung) -> None:
+        """Hold the answers to come near the one before if the path changes and the cost does not."""
+        moved, cost = self.changes[-1]
+        wanders = len(self.changes) > 1 and LEAST_FALL * moved > self.changes[-2][0]
+        flat = cost < FLAT * moved or wanders or rung.answer.iterations > LONG
+        if self.linear and moved > self.tol and flat:
+            tighter = TIGHTER * self.lean if wanders and cost < SAME_COST * self.tol else self.lean
+            self.lean = max(tighter, min(HELD * self.tol, MOST_HELD))
 
     def _cuts(self, path: DiscretePath, objective: float, longest: float) -> tuple[np.ndarray, float]:
         """Into how many parts to cut each step, and by how much the error falls then at most.
@@ -124,7 +172,8 @@ class _Refinement:
         errors = local_errors(self.ladder.dynamics, path, self.problem.start_time)
         places = corners(self.problem, path, objective)
         most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
-        return _cuts_of(path, errors, places, wanted), most
+        fall = max(self.changes[-2]) / max(*self.changes[-1], TINY) if len(self.changes) > 1 else np.inf
+        return _cuts_of(path, errors, places, wanted, 2 if fall < SLOW else 1), most
 
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
@@ -132,29 +181,55 @@ class _Refinement:
         The cost of the rounding of |F| counts in the error, but not in whether the tolerance is met: no mesh
         brings it down.
         """
-        found = estimate(self.problem, self.ladder.dynamics, path, self.changes, most)
+        found = estimate(self.problem, self.ladder.dynamics, path, rung.level.objective, self.changes, most)
         met = found.largest <= self.tol
         rounded = rounding_cost(self.problem, path) / max(abs(rung.level.objective), TINY)
         found = replace(found, objective=found.objective + rounded)
         self.errors[rung.number] = found.largest
         if self.best is None or found.largest < self.best.error.largest:
             self.best, self.worse = _Found(rung, found), 0
-        else:
+        elif max(self.changes[-1]) > FALLING * max(self.changes[-2:][0]):
             self.worse += 1
         self.rounded = rounded
         return met
 
+    def _released(self, rung: Rung) -> Rung:
+        """An answer on the same mesh that is an optimum, and not only the best one near another path.
+
+        Where it is another path of the same cost, no error of the mesh moved it.
+        """
+        begun, lean = rung, self.lean
+        while rung.solved and rung.pull > OFF_OPTIMUM:
+            lean *= 0.1
+            # With multipliers the barrier is so low that a switch moves from node to node.
+            start = replace(rung.path, multipliers={})
+            rung = self.ladder.try_on(start, most=MOST_HOLDING, pinned=begun.pinned, lean=lean)
+        if not rung.solved:
+            return begun
+        none = np.ones(len(rung.nlp.mesh) - 1, int)
+        moved = change((begun.path, begun.level.objective), (rung.path, rung.level.objective), none)
+        if moved[1] > SAME_COST * self.tol:
+            self.changes[-1] = (self.changes[-1][0] + moved[0], self.changes[-1][1] + moved[1])
+        elif moved[0] > self.tol:
+            self.reason += f"; paths that differ by {moved[0]:.1g} of the extent cost the same"
+        return rung
+
     def _sharpen(self, rung: Rung, most: float) -> None:
         """Where the rounding of |F| alone costs more than the tolerance, round it less on the same mesh."""
         width = self.problem.actuator.smoothing
-        while width is not None and self.rounded > ROUNDING_SHARE * self.tol and width > LEAST_ROUNDING:
-            width = max(width * max(0.5 * ROUNDING_SHARE * self.tol / self.rounded, 0.1), LEAST_ROUNDING)
+        while width is not None and self._rounded_too_much() and width > LEAST_ROUNDING:
+            share = 0.5 * ROUNDING_SHARE * self.tol / self.rounded
+            width = max(width * min(max(share, 0.1), 0.5), LEAST_ROUNDING)
             sharper = self.ladder.try_on(rung.path, width, MOST_SHARPENING)
             if not sharper.solved:
                 return
             rung, self.problem = sharper, sharper.problem
             self._judge(rung, rung.path, most)
             self.reason += f"; |F| rounded over {width:.0e} of the largest thrust"
+
+    def _rounded_too_much(self) -> bool:
+        over = self.best is not None and self.best.error.largest > self.tol
+        return self.rounded > 0 and (over or self.rounded > ROUNDING_SHARE * self.tol)
 
     def _settled(self, reason: str) -> Solution:
         """The best answer that was found, which need not be the last one."""
@@ -181,17 +256,19 @@ def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int,
     return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
 
 
-def _cuts_of(path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float) -> np.ndarray:
+def _cuts_of(
+    path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float, least: int
+) -> np.ndarray:
     """Into how many parts to cut each step.
 
-    A step is cut in two, or stays whole if it is one of those that together make little of the local errors.
+    A step is cut in two or, if it is one of those that together make little of the local errors, into `least`.
     At corners it is cut into as many parts as lead to the shortest step wanted there, since the error falls
     only with the length of that step.
     """
     parts, order = np.full(len(errors), 2), np.argsort(errors)
     # Cutting all steps in two leaves 2^-order of the errors: steps that together make half of that can wait.
     small = np.cumsum(errors[order]) <= 0.5 * 2.0**-path.order * errors.sum()
-    parts[order[small]] = 1
+    parts[order[small]] = least
     for k in corners:
         near = slice(max(k - 1, 0), k + 2)
         wanted = np.round(np.diff(path.mesh)[near] / shortest).astype(int)

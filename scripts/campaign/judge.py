@@ -40,9 +40,9 @@ class Truth:
         Speed limit [m/s].
     cost : str
         Name of the objective: effort, fuel, time, mass, height or radius.
-    least, known : float
-        A proven bound of the objective, and what a path costs that is known to be possible; NaN if there is
-        none.
+    least, known, dear : float
+        A proven bound of the objective; what a path costs that is known to be possible, NaN if none is; and how
+        many times that an answer may cost.
     """
 
     world: World
@@ -56,6 +56,7 @@ class Truth:
     fastest: float = np.inf
     least: float = np.nan
     known: float = np.nan
+    dear: float = DEAR
 
 
 def faults(truth: Truth, solution: Any, tol: float | None) -> list[str]:
@@ -213,6 +214,6 @@ def _costs(
         found.append(f"the final mass is said to be {solution.final_mass:.9g}, flown {flight.mass[-1]:.9g} kg")
     if solution.objective < truth.least * (1 - allowed):
         found.append(f"costs {solution.objective:.6g}, less than the proven bound {truth.least:.6g}")
-    if truth.cost in ("effort", "fuel", "time") and solution.objective > DEAR * truth.known:
+    if truth.cost in ("effort", "fuel", "time") and solution.objective > truth.dear * truth.known:
         found.append(f"costs {solution.objective:.6g}, but a known path {truth.known:.6g}")
     return found

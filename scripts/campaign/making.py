@@ -20,15 +20,20 @@ TOLERANCES = (None, None, 1e-3, 1e-4, 1e-5)
 
 @dataclass(frozen=True)
 class Scene:
-    """A problem, how it is to be solved, and what the judge knows of it.
+    """The parts of a problem, how it is to be solved, and what the judge knows of it.
 
     `blames` are words of which a failure must say one, for a scene that cannot be solved; empty for others.
     """
 
-    problem: dmoc.TransferProblem
+    parts: dict[str, Any]
     truth: Truth
     options: dict[str, Any] = field(default_factory=dict)
     blames: tuple[str, ...] = ()
+
+    @property
+    def problem(self) -> dmoc.TransferProblem:
+        """The problem; a ValueError if the program refuses it."""
+        return dmoc.TransferProblem(**self.parts)
 
 
 @dataclass(frozen=True)
@@ -47,9 +52,20 @@ class Journey:
 
 
 def journey(
-    rng: Generator, world: World, push: Push, mass: float, start: tuple, duration: float, share: float = 0.5
+    rng: Generator,
+    world: World,
+    push: Push,
+    mass: float,
+    start: tuple,
+    duration: float,
+    share: float = 0.5,
+    begin: float = 0.0,
+    steady: bool = False,
 ) -> Journey:
-    """Fly a random smooth force of at most `share` of the limit, in a ball of that size, by SciPy."""
+    """Fly a random smooth force of at most `share` of the limit, in a ball of that size, by SciPy.
+
+    If `steady`, the force has that magnitude all the way and only turns; it starts at the time `begin` [s].
+    """
     n, size = push.dimension, push.limit * share
     waves, shifts = rng.standard_normal((3, n)), rng.uniform(0, 2 * np.pi, (3, n))
     rates = np.arange(3)[:, None] * np.pi / duration
@@ -60,12 +76,13 @@ def journey(
     peak = max(np.linalg.norm(raw(t)) for t in np.linspace(0, duration, 101))
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:
-        force, q, v, m = size / peak * raw(t), y[:n], y[n : 2 * n], y[2 * n]
+        q, v, m = y[:n], y[n : 2 * n], y[2 * n]
+        force = size * raw(t) / (np.linalg.norm(raw(t)) if steady else peak)
         size_now = np.linalg.norm(force)
         paid = np.abs(force).sum() if push.kind == "nozzles" else size_now
         burnt = paid / push.exhaust if push.exhaust else 0.0
         return np.concatenate(
-            [v, world.acceleration(t, q, v, m) + force / m, [-burnt, paid, 0.5 * size_now**2]]
+            [v, world.acceleration(begin + t, q, v, m) + force / m, [-burnt, paid, 0.5 * size_now**2]]
         )
 
     y0 = np.concatenate([*start, [mass, 0.0, 0.0]])
@@ -98,7 +115,14 @@ def scene(
     `other` may hold parts of the problem (goal, constraints, duration) and of the truth (reached, zones,
     fastest, least).
     """
-    objective = {"effort": dmoc.Effort(), "fuel": dmoc.Fuel(), "time": dmoc.Time(), "mass": dmoc.FinalMass()}
+    objective = {
+        "effort": dmoc.Effort(),
+        "fuel": dmoc.Fuel(),
+        "time": dmoc.Time(),
+        "mass": dmoc.FinalMass(),
+        "height": dmoc.FinalHeight(),
+        "radius": dmoc.FinalRadius(),
+    }
     if cost == "fuel" and push.kind in ("ball", "box"):
         push = replace(push, metered=True)
     about = (0.3 * found.duration, 1.5 * found.duration) if cost == "time" else found.duration
@@ -108,7 +132,7 @@ def scene(
         world,
         push,
         mass,
-        at(*found.start),
+        other.pop("left", at(*found.start)),
         reached,
         duration if isinstance(duration, tuple) else (duration, duration),
         cost,
@@ -117,17 +141,17 @@ def scene(
         known=found.costs.get(cost, math.nan),
         least=other.pop("least", bound(world, push, mass, found, cost, duration)),
     )
-    parts = {"goal": dmoc.State(*found.goal), **other}
-    problem = dmoc.TransferProblem(
-        mass,
-        dmoc.State(*found.start),
-        duration=duration,
-        effects=world.effects,
-        actuator=push.actuator,
-        objective=objective[cost],
-        **parts,
-    )
-    return Scene(problem, truth, numerics(rng, cost) if options is None else options)
+    parts = {
+        "mass": mass,
+        "start": dmoc.State(*found.start),
+        "goal": dmoc.State(*found.goal),
+        "duration": duration,
+        "effects": world.effects,
+        "actuator": push.actuator,
+        "objective": objective[cost],
+        **other,
+    }
+    return Scene(parts, truth, numerics(rng, cost) if options is None else options)
 
 
 def at(position: Any, velocity: Any) -> Callable:

@@ -19,15 +19,18 @@ class World:
     """What acts on the body: effects for the program, and the same as accelerations for the judge.
 
     `steady` is the constant acceleration of a scene in which nothing else acts, None in any other: closed forms
-    exist for these.
+    exist for these. `linear` says that the acceleration is an affine function of place and velocity, the same
+    at all times.
     """
 
     effects: tuple[dmoc.Effect, ...] = ()
     pulls: tuple[Pull, ...] = ()
     steady: np.ndarray | None = None
+    linear: bool = False
 
     def __add__(self, other: "World") -> "World":
-        return World(self.effects + other.effects, self.pulls + other.pulls)
+        both = self.linear and other.linear
+        return World(self.effects + other.effects, self.pulls + other.pulls, linear=both)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray, m: float) -> np.ndarray:
         """[m/s^2], without the force of the actuator."""
@@ -35,18 +38,17 @@ class World:
 
 
 def nothing(dimension: int) -> World:
-    return World(steady=np.zeros(dimension))
+    return World(steady=np.zeros(dimension), linear=True)
 
 
 def gravity(acceleration: np.ndarray) -> World:
-    return World(
-        (dmoc.UniformGravity(tuple(acceleration)),), (lambda t, q, v, m: acceleration,), steady=acceleration
-    )
+    effect = dmoc.UniformGravity(tuple(acceleration))
+    return World((effect,), (lambda t, q, v, m: acceleration,), steady=acceleration, linear=True)
 
 
 def resistance(coefficient: float) -> World:
     """Drag [N] of so much a speed [m/s]."""
-    return World((dmoc.LinearDrag(coefficient),), (lambda t, q, v, m: -coefficient / m * v,))
+    return World((dmoc.LinearDrag(coefficient),), (lambda t, q, v, m: -coefficient / m * v,), linear=True)
 
 
 def air(area: float, density: float) -> World:
@@ -77,7 +79,7 @@ def turning(rate: float, dimension: int) -> World:
     spin = np.zeros((dimension, dimension))
     spin[0, 1], spin[1, 0] = -rate, rate
     twice = spin @ spin
-    return World((dmoc.RotatingFrame(rate),), (lambda t, q, v, m: -2 * spin @ v - twice @ q,))
+    return World((dmoc.RotatingFrame(rate),), (lambda t, q, v, m: -2 * spin @ v - twice @ q,), linear=True)
 
 
 def neighbourhood(n: float, dimension: int) -> World:
@@ -85,12 +87,12 @@ def neighbourhood(n: float, dimension: int) -> World:
     by_place = np.diag([3 * n**2, 0.0, -(n**2)][:dimension])
     by_speed = np.zeros((dimension, dimension))
     by_speed[0, 1], by_speed[1, 0] = 2 * n, -2 * n
-    return World((dmoc.ClohessyWiltshire(n),), (lambda t, q, v, m: by_place @ q + by_speed @ v,))
+    return World((dmoc.ClohessyWiltshire(n),), (lambda t, q, v, m: by_place @ q + by_speed @ v,), linear=True)
 
 
 def spring(stiffness: float, anchor: np.ndarray) -> World:
     effect = dmoc.Spring(stiffness, tuple(anchor))
-    return World((effect,), (lambda t, q, v, m: -stiffness / m * (q - anchor),))
+    return World((effect,), (lambda t, q, v, m: -stiffness / m * (q - anchor),), linear=True)
 
 
 def two_primaries(ratio: float) -> World:

@@ -27,6 +27,7 @@ from dmoc import (
     TransferProblem,
     UniformGravity,
     solve,
+    three_body,
 )
 from dmoc.nlp import elastic as relaxation
 from dmoc.scene.problem_file import load_problem
@@ -50,6 +51,12 @@ def asked_for(solution, pattern):
     found = re.search(pattern.replace("#", NUMBER), solution.message)
     assert found, solution.message
     return float(found[1]), float(found[2])
+
+
+def on_one_mesh(failed):
+    """Whether the problem itself was tried on one mesh; twice its steps tell that the mesh is not to blame."""
+    tried = {level.steps for level in failed.ladder if not level.question}
+    return len(tried) == 1 and {level.steps for level in failed.ladder} <= {*tried, 2 * max(tried)}
 
 
 # a problem with too small a limit as a function of the limit, that limit, and what is known of the one needed
@@ -80,7 +87,8 @@ def test_the_limit_that_is_enough(name):
     problem, given, known = LIMITED[name]
     failed = solve(problem(given))
     needed, said = asked_for(failed, "(?:force limit|thrust) of # N .you gave # N")
-    assert said == given and len({level.steps for level in failed.ladder}) == 1
+    assert said == given
+    assert on_one_mesh(failed)
     assert known is None or needed == pytest.approx(known, rel=2e-3)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
@@ -118,7 +126,7 @@ def test_a_limit_that_is_off_by_orders_of_magnitude(name):
     failed = solve(problem(given))
     needed, said = asked_for(failed, "(?:force limits?|thrust) of [(]?#.*?.you gave [(]?#")
     assert said == given and needed == pytest.approx(known, rel=2e-3)
-    assert len({level.steps for level in failed.ladder}) == 1
+    assert on_one_mesh(failed)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
 
@@ -179,7 +187,8 @@ def test_the_duration_that_is_enough(name):
     problem, given, known = BRIEF[name]
     failed = solve(problem(given))
     needed, said = asked_for(failed, "# s .you gave # s")
-    assert said == given and len({level.steps for level in failed.ladder}) == 1
+    assert said == given
+    assert on_one_mesh(failed)
     assert known is None or needed == pytest.approx(known, rel=5e-3)
     assert solve(problem(1.01 * needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
@@ -222,3 +231,50 @@ def test_the_worst_rows_are_in_units_of_the_problem():
     # the momentum that 1 N cannot give, 4/1.9 - 1.9 N s in all, over half a step
     lacking = sum(size for name, size, _ in failed.worst[:2]) * 0.5 * 1.9 / 50
     assert lacking == pytest.approx(4 / 1.9 * 0.5 - 0.5 * 1.9, rel=0.05)
+
+
+def test_the_dry_mass_that_leaves_propellant_enough():
+    """Two short burns and a coast change the velocity by 2 d / T at least, which takes so much propellant."""
+    way, duration, exhaust, mass = 2.0, 4.0, 20.0, 1.7
+    least = mass * (1 - np.exp(-2 * way / duration / exhaust))
+    engine = Engine(12.0, exhaust_velocity=exhaust, dry_mass=mass - 0.7 * least)
+    still = (0.0, 0.0)
+    failed = solve(
+        TransferProblem(mass, State(still, still), State((way, 0.0), still), duration, actuator=engine)
+    )
+    needed, _ = asked_for(failed, "a dry mass of # kg .you gave # kg")
+    assert mass - 1.3 * least < needed < mass - least
+    assert on_one_mesh(failed)
+    enough = replace(engine, dry_mass=mass - 1.01 * (mass - needed))
+    answer = solve(
+        TransferProblem(mass, State(still, still), State((way, 0.0), still), duration, actuator=enough)
+    )
+    assert answer.success, answer.message
+
+
+def test_between_two_attractors_the_verdict_is_one_of_the_guess():
+    """One that passes on the wrong side of an attractor needs far more than another one would."""
+    hurried = TransferProblem(
+        1.0,
+        State((0.7, 0.0), (0.0, 0.2)),
+        State((0.75, 0.3), (0.0, 0.0)),
+        0.4,
+        effects=three_body(0.1),
+        actuator=BallForce(0.5),
+    )
+    failed = solve(hurried, order=6, steps=30)
+    assert "a path near the guess needs a force limit of" in failed.message, failed.message
+
+
+def test_what_a_wide_rounding_burns_is_not_taken_for_a_lack_of_propellant():
+    """On the coarsest mesh |F| is rounded so widely that the engine at rest burns a fifth of the propellant."""
+    way, duration, exhaust, mass = 2.65, 3.72, 27.87, 1.289
+    engine = Engine(
+        11.6, exhaust_velocity=exhaust, dry_mass=mass * np.exp(-1.09 * 2 * way / duration / exhaust)
+    )
+    still = (0.0, 0.0)
+    problem = TransferProblem(
+        mass, State(still, still), State((way, 0.0), still), duration, actuator=engine, objective=Fuel()
+    )
+    answer = solve(problem, order=6, tol=1e-3)
+    assert answer.success, answer.message

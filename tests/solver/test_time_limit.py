@@ -49,6 +49,15 @@ def test_time_that_is_enough_changes_nothing():
     assert solution.success and solution.warnings == ()
 
 
+def test_the_search_for_a_cause_ends_in_time():
+    problem = load_problem("free_flyer").make(duration=10.0)
+    whole = solve(problem)
+    asked = [level.iterations for level in whole.ladder if level.question]
+    tried = [level.iterations for level in whole.ladder if not level.question]
+    cut = solve(problem, time_limit=0.01 * (tried[0] + 0.5 * asked[0]))
+    assert "time limit" in cut.message and cut.iterations < sum(tried[:1]) + sum(asked[:1])
+
+
 @pytest.mark.parametrize("limit, code", [("0.03", 3), ("2", 4)])
 def test_the_exit_code_tells(limit, code, capsys):
     with pytest.raises(SystemExit) as done:

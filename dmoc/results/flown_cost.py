@@ -1,0 +1,77 @@
+"""What the control that is flown costs, against the sum over the nodes that the objective is."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.memory import remembered
+from dmoc.motion.configuration import configuration_of, places_in
+from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.flown import flown
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.problem import TransferProblem
+
+# An objective of 0 is replaced by this, the smallest number of full precision, before something is divided by
+# it.
+TINY = float(np.finfo(float).tiny)
+
+
+def unpriced(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, objective: float) -> float:
+    """By how much the control that is flown costs more or less than the objective, over it [-].
+
+    They differ where the polynomial through the nodes of a step breaks the limit of the actuator and two
+    constant pieces of the same impulse are flown: the integral of their square is not the sum over the nodes.
+    """
+    if path.hold or path.order == 2:
+        return 0.0
+    known, rule, many = flown(dynamics, path), scheme(path.order), scheme(8)
+    if not known.broken.any():
+        return 0.0
+    piece = np.searchsorted(path.mesh, 0.5 * (known.mesh[1:] + known.mesh[:-1])) - 1
+    pieces, steps = np.flatnonzero(known.broken[piece]), np.flatnonzero(known.broken)
+    owner, length = piece[pieces], np.diff(path.mesh)
+    lasts = np.diff(known.mesh)[pieces]
+    inside = (known.mesh[pieces] - path.mesh[owner])[:, None] + lasts[:, None] * many.points
+    controls = np.einsum("pj,jkn->kpn", rule.values_at(many.points), known.nodes[:, pieces])
+    rates = _rates(problem, path, owner, inside / length[owner, None], controls)
+    nodes = path.control[step_nodes(len(length), rule)[:, steps]].swapaxes(0, 1)
+    summed = _rates(problem, path, steps, np.tile(rule.points, (len(steps), 1)), nodes)
+    gap = lasts @ rates @ many.weights - length[steps] @ summed @ rule.weights
+    return float(abs(path.duration * gap) / max(abs(objective), TINY))
+
+
+def _rates(
+    problem: TransferProblem, path: DiscretePath, steps: np.ndarray, inside: np.ndarray, controls: np.ndarray
+) -> np.ndarray:
+    """Running cost at fractions of steps, shape (count, places); controls have shape (count, places, size)."""
+    rule = scheme(path.order)
+    at, length = step_nodes(len(path.mesh) - 1, rule)[:, steps].T, path.duration * np.diff(path.mesh)[steps]
+    values = rule.values_at(inside.ravel()).reshape(*inside.shape, -1)
+    slopes = rule.slopes_at(inside.ravel()).reshape(*inside.shape, -1) / length[:, None, None]
+    q = np.einsum("kpj,kjn->nkp", values, path.place[at])
+    v = np.einsum("kpj,kjn->nkp", slopes, path.place[at])
+    m = np.einsum("kpj,kj->kp", values, path.mass[at])
+    t = problem.start_time + path.duration * path.mesh[steps, None] + length[:, None] * inside
+    n, u = path.place.shape[1], np.moveaxis(controls, 2, 0)
+    rate, _ = cost_functions(problem)
+    found = rate(t.reshape(1, -1), q.reshape(n, -1), v.reshape(n, -1), u.reshape(len(u), -1), m.reshape(1, -1))
+    return np.array(found).reshape(inside.shape)
+
+
+def cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
+    """(t, q, v, u, m) -> running cost, (t, q, v, m) -> cost of the end."""
+    parts = configuration_of(problem), problem.objective, problem.actuator
+    return remembered(partial(_written, problem), "cost", *parts)
+
+
+def _written(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
+    t, q, v, m = state_symbols(int(places_in(configuration_of(problem).blocks).sum()))
+    u = ca.SX.sym("u", problem.controls)
+    rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
+    terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
+    return ca.Function("rate", [t, q, v, u, m], [rate]), terminal

@@ -1,0 +1,163 @@
+"""Flat optima, the cost of the control that is flown, and meshes that are to blame."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from dmoc import (
+    BallForce,
+    Engine,
+    FinalMass,
+    Fuel,
+    Moving,
+    Nozzles,
+    PointGravity,
+    RotatingFrame,
+    SpeedLimit,
+    Spring,
+    State,
+    TransferProblem,
+    UniformGravity,
+    solve,
+    verify,
+)
+from dmoc.motion.dynamics import Dynamics
+from dmoc.results.flown_cost import unpriced
+
+CROSS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+# from place to place in a frame that turns; duality proves that the least fuel is 0.8653420757 N s
+TURNING = TransferProblem(
+    1.5112557613745101,
+    State((-0.10177345752099187, 0.40357213749672255), (-0.15485352081870432, -0.1902283945802528)),
+    State((0.42720940549401765, 0.3091532377767155), (-0.5054467812085968, 0.4412150242894053)),
+    3.034941425192684,
+    effects=[
+        RotatingFrame(1.4473703428550952),
+        Spring(1.8612951246855574, (-0.2250804531885441, -0.0088041720532)),
+    ],
+    actuator=Engine(1.2891952323352933),
+    objective=Fuel(),
+)
+# a rocket on a line: when it burns hardly matters
+SOUNDING = TransferProblem(
+    2.4519400997535183,
+    State((2.310928280227888,), (-1.0529030259559071,)),
+    State((-3.116673211168544,), (-3.2002064895798394,)),
+    2.3552134024284466,
+    effects=[UniformGravity((-1.6,))],
+    actuator=Nozzles(((1.0,), (-1.0,)), 8.300159105638235, exhaust_velocity=10.647921016102256, dry_mass=1.11),
+    objective=FinalMass(),
+)
+
+
+@pytest.mark.parametrize(
+    ("problem", "options", "known"),
+    [
+        (TURNING, {"order": 4, "tol": 1e-4}, 0.8653420757),
+        (SOUNDING, {"order": 2, "tol": 1e-3, "hold": True}, 2.1057),
+    ],
+)
+def test_where_paths_cost_the_same_the_tolerance_is_met(problem, options, known):
+    solution = solve(problem, **options)
+    assert solution.success, solution.message
+    assert solution.objective == pytest.approx(known, rel=options["tol"])
+    # What held the path near the one before is let go in the end.
+    assert verify(solution).ok
+    assert solution.iterations < 400
+
+
+def test_the_thrust_of_nozzles_is_flown_as_it_is_paid_for():
+    """The sum of the nozzles is not the magnitude of their force, and no part of it is idle."""
+    passing = TransferProblem(
+        0.9785142497775168,
+        State((0.8943057816445376, 0.44745633185502337), (-0.6814792571629095, 1.362034228513449)),
+        State((-0.12088030004049478, 1.556680840241573), (-1.02500676327186, 0.7124265496020762)),
+        1.0810482279069835,
+        effects=[PointGravity(1.0)],
+        actuator=Nozzles(CROSS, 0.07229440030755822),
+        objective=Fuel(),
+    )
+    solution = solve(passing, order=8, tol=1e-4)
+    assert solution.success and solution.steps < 250
+
+
+def test_where_the_error_of_the_cost_falls_slowly_all_steps_are_cut():
+    """At order 2 the effort of a small correction errs in steps in which the path does not."""
+    passing = TransferProblem(
+        1.0,
+        State((1.0, 0.0), (0.0, 1.3)),
+        State((-0.35, 1.22), (-0.99, 0.42)),
+        1.65,
+        effects=[PointGravity(1.0)],
+    )
+    sharp = solve(passing, order=8, tol=1e-8)
+    coarse = solve(passing, order=2, tol=1e-5)
+    assert coarse.success, coarse.message
+    assert coarse.objective == pytest.approx(sharp.objective, rel=1e-5)
+
+
+# 0.47 m in 4.1 s at no more than 2 % above the mean speed: the ramps take a fiftieth of the time each
+RAMPS = TransferProblem(
+    0.7811846564173863,
+    State((0.44905471156263277,), (0,)),
+    State((-0.01943549610964612,), (0,)),
+    4.109656028192127,
+    actuator=BallForce(1.1006753584950362),
+    constraints=[SpeedLimit(0.11682587443685435)],
+)
+
+
+@pytest.mark.parametrize("options", [{"order": 4}, {"order": 6}, {"order": 8}, {"tol": 1e-4}])
+def test_ramps_shorter_than_a_step_are_found_and_paid_for(options):
+    solution = solve(RAMPS, **options)
+    assert solution.success and verify(solution).ok, solution.message
+    exact = solve(RAMPS, order=4, tol=1e-5)
+    assert solution.objective == pytest.approx(exact.objective, rel=1e-2)
+    # The control of the answer, flown by its pieces, has the effort that is stated.
+    assert unpriced(RAMPS, Dynamics.of(RAMPS), solution.path, solution.objective) <= 1e-2
+
+
+def test_a_cost_that_is_not_flown_fails_the_ledger():
+    solution = solve(RAMPS, order=8, steps=32)
+    check = verify(solution)["ledger"]
+    assert not check.ok and check.unit == "of the objective"
+
+
+def test_a_limit_that_is_too_small_on_every_mesh_is_still_told():
+    slow = replace(RAMPS, constraints=[SpeedLimit(0.11)])
+    for options in ({"tol": 1e-4}, {"order": 6}):
+        failed = solve(slow, **options)
+        assert not failed.success and "speed limit of" in failed.message, failed.message
+    weak = replace(RAMPS, actuator=BallForce(0.05))
+    failed = solve(weak, tol=1e-3)
+    assert "force limit of" in failed.message and "steps as long" not in failed.message
+
+
+def test_what_is_flown_costs_what_the_nodes_say_where_no_limit_is_broken():
+    free = TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 2.0)
+    solution = solve(free, order=6, steps=10)
+    assert unpriced(free, Dynamics.of(free), solution.path, solution.objective) == 0.0
+    assert np.isfinite(solution.objective)
+
+
+def test_the_effort_of_nozzles_has_a_unit_though_all_at_once_make_no_force():
+    """A unit of 1 N^2 s for an effort of 4e8 left the first-order conditions open by 2e-4 of 1."""
+    heavy = TransferProblem(
+        4655.271568681675,
+        State((119.72664887819526, 119.6408106038325), (3.535863108859444, 3.5091285081502264)),
+        State((119.86625356093921, 119.81667721032373), (3.343676749717904, 4.111767712489929)),
+        0.044603736000931295,
+        actuator=Nozzles(CROSS, 578403.8162589258),
+    )
+    solution = solve(heavy)
+    assert solution.success and verify(solution).ok
+
+
+def test_a_target_that_moves_is_met_sooner_where_the_longest_time_leads_nowhere():
+    place, speed, meeting = np.array([1.0, 0.5]), np.array([1.2, -0.8]), 2.0
+    target = Moving(lambda t: ca.DM(place) + ca.DM(speed) * ca.sin(3.0 * (t - meeting)) / 3.0, "matched")
+    chase = TransferProblem(1.0, State((0, 0), (0, 0)), target, (1.0, 3.6), actuator=BallForce(1.6))
+    solution = solve(chase, order=6)
+    assert solution.success, solution.message
