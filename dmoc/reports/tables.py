@@ -33,8 +33,8 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
     for i, row in enumerate(rows):
         table.add_row(
             row.name if row.listed else f"({row.name})",
-            f"{row.acceleration:.2e} m/s\u00b2",
-            _length(row.displacement),
+            _joined(row.acceleration, "m/s\u00b2", row.angular_acceleration, "rad/s\u00b2"),
+            _moved(row.displacement, row.turn),
             f"{row.instructions:,}",
             f"{100 * row.time_share:.0f} %",
             style=None if row.listed else "dim",
@@ -48,6 +48,19 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
     if not all(row.listed for row in rows):
         note += " Effects in brackets are not in the scene: what they would do and cost."
     return Group(table, Text(note)) if rows else Text("The scene has no effect: there is nothing to leave out.")
+
+
+def _joined(linear: float, unit: str, turning: float, of_turning: str) -> str:
+    """An acceleration, beside it that of a turn if there is one."""
+    if turning and not linear:
+        return f"{turning:.2e} {of_turning}"
+    return f"{linear:.2e} {unit}" + (f", {turning:.2e} {of_turning}" if turning else "")
+
+
+def _moved(metres: float, degrees: float) -> str:
+    if degrees and not metres:
+        return f"{degrees:.3g} degrees"
+    return _length(metres) + (f", {degrees:.3g} degrees" if degrees else "")
 
 
 def _length(metres: float) -> str:

@@ -59,7 +59,9 @@ def _rates(
     t = problem.start_time + path.duration * path.mesh[steps, None] + length[:, None] * inside
     n, u = path.place.shape[1], np.moveaxis(controls, 2, 0)
     rate, _ = cost_functions(problem)
-    found = rate(t.reshape(1, -1), q.reshape(n, -1), v.reshape(n, -1), u.reshape(len(u), -1), m.reshape(1, -1))
+    many = t.size
+    q, v, u = (values.reshape(count, many) for values, count in ((q, n), (v, n), (u, len(u))))
+    found = rate(t.reshape(1, many), q, v, u, m.reshape(1, many))
     return np.array(found).reshape(inside.shape)
 
 

@@ -232,7 +232,7 @@ class Relaxable:
         """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""
         inside = np.linspace(0, 1, 9)[1:-1, None, None]
         chords = (1 - inside) * path.place[:-1] + inside * path.place[1:]
-        chords = chords.reshape(chords.shape[0] * chords.shape[1], -1)
+        chords = chords.reshape(chords.shape[0] * chords.shape[1], chords.shape[2])
         zones = [zone for zone in self.problem.constraints if np.isfinite(zone.feature())]
         return any((zone.excess(chords, chords) > LEAP * zone.feature()).any() for zone in zones)
 

@@ -6,7 +6,6 @@ import math
 import time
 from dataclasses import dataclass, fields, is_dataclass, replace
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.docstrings import documented
@@ -20,12 +19,12 @@ from dmoc.effects import (
     ThirdBody,
     circular_motion,
 )
-from dmoc.motion.configuration import Translation
-from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.configuration import speeds_in
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.reference import reference
+from dmoc.motion.reference import apart, reference
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
@@ -73,6 +72,8 @@ class Influence:
         What it adds to one evaluation of a node, a step and the ends, derivatives included.
     time_share : float
         Its share of the time to evaluate Jacobian and Hessian on the whole mesh, measured [-].
+    angular_acceleration, turn : float
+        The same for the attitude of a body that turns [rad/s^2], [degrees].
     """
 
     effect: Effect
@@ -82,6 +83,8 @@ class Influence:
     displacement: float
     instructions: int
     time_share: float
+    angular_acceleration: float = 0.0
+    turn: float = 0.0
 
 
 def influences(solution: Solution, others: bool = False) -> list[Influence]:
@@ -147,30 +150,34 @@ def _influence(
     ]
     more, less = (_instructions(each, path) for each in (scene, without))
     slow, fast = _seconds(path, scene, without)
+    moved, speeds = apart(path.parts, *ends), speeds_in(path.parts)
+    pulls = _accelerations(problem, path, effect)
     return Influence(
         effect,
         name,
         listed,
-        _largest_acceleration(problem, path, effect),
-        float(np.linalg.norm(ends[0] - ends[1])),
+        _largest(pulls[:, speeds]),
+        float(np.linalg.norm(moved[speeds])),
         more - less,
         max(0.0, 1 - fast / slow),
+        _largest(pulls[:, ~speeds]),
+        float(np.degrees(np.linalg.norm(moved[~speeds]))),
     )
 
 
-def _largest_acceleration(problem: TransferProblem, path: DiscretePath, effect: Effect) -> float:
-    """Largest change of the acceleration by one effect along the path, at the step ends [m/s^2]."""
-    n = problem.dimension
-    t, q, v, m = state_symbols(n)
-    still = ca.DM.zeros(n)
-    # the acceleration of a scene with this effect only, without a force of the actuator
-    alone = Dynamics(Translation(n), (effect,), problem.actuator).acceleration(t, q, v, m, still)
-    function = ca.Function("alone", [t, q, v, m], [ca.densify(ca.SX(alone))])
-    ends = slice(None, None, scheme(path.order).degree)
+def _largest(rows: np.ndarray) -> float:
+    return float(np.linalg.norm(rows, axis=1).max(initial=0.0))
+
+
+def _accelerations(problem: TransferProblem, path: DiscretePath, effect: Effect) -> np.ndarray:
+    """Change of the acceleration by one effect at the step ends, one entry a freedom [m/s^2], [rad/s^2]."""
+    dynamics, ends = Dynamics.of(problem), slice(None, None, scheme(path.order).degree)
     times = problem.start_time + path.duration * path.mesh
-    _, velocity = end_momenta(Dynamics.of(problem), path, problem.start_time)
-    pulls = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
-    return float(np.linalg.norm(pulls, axis=0).max())
+    _, velocity = end_momenta(dynamics, path, problem.start_time)
+    states = times[None], path.position[ends].T, velocity.T, path.mass[ends][None], np.zeros(dynamics.freedom)
+    # The acceleration of a scene with this effect only, without a force of the actuator, and that with none.
+    some, none = (np.array(replace(dynamics, effects=acts).acceleration(*states)) for acts in ((effect,), ()))
+    return (some - none).T
 
 
 def _instructions(problem: TransferProblem, path: DiscretePath) -> int:
