@@ -37,12 +37,7 @@ if TYPE_CHECKING:
     from dmoc.effects import Effect as Effect
     from dmoc.effects import ExponentialAtmosphere as ExponentialAtmosphere
     from dmoc.effects import Force as Force
-    from dmoc.effects import GravityGradient as GravityGradient
     from dmoc.effects import LinearDrag as LinearDrag
-    from dmoc.effects import PivotGravity as PivotGravity
-    from dmoc.effects import PlateDrag as PlateDrag
-    from dmoc.effects import PlateRadiation as PlateRadiation
-    from dmoc.effects import Plates as Plates
     from dmoc.effects import PointGravity as PointGravity
     from dmoc.effects import RadiationPressure as RadiationPressure
     from dmoc.effects import RotatingFrame as RotatingFrame
@@ -56,6 +51,11 @@ if TYPE_CHECKING:
     from dmoc.effects import kepler_motion as kepler_motion
     from dmoc.effects import tabulated_motion as tabulated_motion
     from dmoc.effects import three_body as three_body
+    from dmoc.effects.bodies import GravityGradient as GravityGradient
+    from dmoc.effects.bodies import PivotGravity as PivotGravity
+    from dmoc.effects.bodies import PlateDrag as PlateDrag
+    from dmoc.effects.bodies import PlateRadiation as PlateRadiation
+    from dmoc.effects.bodies import Plates as Plates
     from dmoc.exports.export import export as export
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate

@@ -9,7 +9,6 @@ from dmoc.effects.atmosphere import (
     Wind,
 )
 from dmoc.effects.base import Body, BodyConservative, BodyForce, Conservative, Effect, Force
-from dmoc.effects.bodies import GravityGradient, PivotGravity, PlateDrag, PlateRadiation, Plates
 from dmoc.effects.frames import ClohessyWiltshire, RotatingFrame, three_body
 from dmoc.effects.gravity import J2, PointGravity, Spring, UniformGravity
 from dmoc.effects.motion import circular_motion, kepler_motion, tabulated_motion
@@ -30,12 +29,7 @@ __all__ = [
     "Effect",
     "ExponentialAtmosphere",
     "Force",
-    "GravityGradient",
     "LinearDrag",
-    "PivotGravity",
-    "PlateDrag",
-    "PlateRadiation",
-    "Plates",
     "PointGravity",
     "RadiationPressure",
     "RotatingFrame",

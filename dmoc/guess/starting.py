@@ -13,15 +13,6 @@ from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.open_ends import end_estimates, spiral_between
-from dmoc.guess.turning import (
-    as_point,
-    attitudes_along,
-    checked_turning,
-    joined,
-    turning_duration,
-    turning_states,
-)
-from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -51,7 +42,11 @@ def starting_guess(
     force = getattr(given, "force", None)
     given = getattr(given, "path", given)
     if problem.inertia is not None:
-        return _turning_guess(problem, mesh, order, hold, given, duration)
+        # What turns bodies is loaded for problems with such bodies alone.
+        from dmoc.guess.turning import turning_guess
+
+        point = starting_guess, guess_duration
+        return turning_guess(problem, (mesh, order, hold), given, duration, point)
     if isinstance(given, DiscretePath):
         if given.position.shape[1] != problem.dimension:
             raise ValueError(
@@ -87,40 +82,6 @@ def starting_guess(
     mass = np.full(len(fractions), problem.mass)
     guess = DiscretePath(mesh, order, hold, duration, position, control, mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
-
-
-def _turning_guess(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, given: Any, duration: float | None
-) -> DiscretePath:
-    """The guess of a body that turns."""
-    body = configuration_of(problem)
-    if isinstance(given, DiscretePath):
-        if tuple(given.parts) != tuple(body.blocks):
-            raise ValueError(
-                f"guess has {given.position.shape[1]} coordinates but the problem has {body.size}: "
-                f"{', '.join(body.names)}"
-            )
-        return given.onto(mesh, order, hold)
-    fractions, moves = node_fractions(mesh, scheme(order)), problem.start.has_position
-    point = as_point(problem) if moves else None
-    likely = turning_duration(problem)
-    if point is not None and problem.free_duration and problem.actuator.limited:
-        likely = max(likely if problem.actuator.turning_limit() else 0.0, guess_duration(point))
-    duration = duration or likely
-    control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
-    _, w0, _, w1 = turning_states(problem, duration)
-    if given is not None:
-        position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
-        place = None
-        ends = (w0, w1)
-        if point is not None:
-            linear = starting_guess(point, mesh, order, hold, None, duration)
-            ends = (np.append(linear.start_velocity, w0), np.append(linear.goal_velocity, w1))
-    else:
-        position = attitudes_along(problem, duration, fractions)
-        ends = (w0, w1)
-        place = None if point is None else starting_guess(point, mesh, order, hold, None, duration)
-    return joined(problem, place, (mesh, order, hold, duration, position, ends, control))
 
 
 def _least_effort(
@@ -287,3 +248,14 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
     path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
     return path, (v0, v1), worth
+
+
+def followed(problem: TransferProblem, given: Any) -> TransferProblem:
+    """The problem whose goal has the sign of its quaternion to which a former path leads."""
+    path = getattr(given, "path", given)
+    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
+        return problem
+    ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
+    signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
+    # NaN, where an end leaves its attitude open, is not less than 0.
+    return replace(problem, goal=problem.goal.the_other_way()) if signs[0] * signs[1] < 0 else problem

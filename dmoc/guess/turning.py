@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,8 @@ from dmoc.basics.quaternions import (
     turned_by,
 )
 from dmoc.motion.configuration import configuration_of, quaternions_in
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.forces import BallForce, FreeForce
 from dmoc.parts.objectives import Effort
@@ -82,17 +83,6 @@ def turning_duration(problem: TransferProblem) -> float:
     angle = float(angle_between(q0, q1))
     needed = 2 * np.sqrt(angle / acceleration) + float(np.linalg.norm(w1 - w0)) / acceleration
     return float(np.clip(LEISURE * needed, shortest, longest)) if needed > 0 else middle
-
-
-def followed(problem: TransferProblem, given: Any) -> TransferProblem:
-    """The problem whose goal has the sign of its quaternion to which a former path leads."""
-    path = getattr(given, "path", given)
-    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
-        return problem
-    ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
-    signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
-    # NaN, where an end leaves its attitude open, is not less than 0.
-    return replace(problem, goal=problem.goal.the_other_way()) if signs[0] * signs[1] < 0 else problem
 
 
 def as_point(problem: TransferProblem) -> TransferProblem:
@@ -161,3 +151,41 @@ def joined(problem: TransferProblem, place: DiscretePath | None, guess: tuple) -
     )
     mass = np.full(len(position), problem.mass)
     return DiscretePath(mesh, order, hold, duration, position, control, mass, first, last, blocks=body.blocks)
+
+
+def turning_guess(
+    problem: TransferProblem, on: tuple, given: Any, duration: float | None, for_point: tuple
+) -> DiscretePath:
+    """The guess of a body that turns.
+
+    `on` are mesh, order and hold; `for_point` the functions that give a path and a duration of a point mass.
+    """
+    (mesh, order, hold), (path_of_point, duration_of_point) = on, for_point
+    body = configuration_of(problem)
+    if isinstance(given, DiscretePath):
+        if tuple(given.parts) != tuple(body.blocks):
+            raise ValueError(
+                f"guess has {given.position.shape[1]} coordinates but the problem has {body.size}: "
+                f"{', '.join(body.names)}"
+            )
+        return given.onto(mesh, order, hold)
+    fractions, moves = node_fractions(mesh, scheme(order)), problem.start.has_position
+    point = as_point(problem) if moves else None
+    likely = turning_duration(problem)
+    if point is not None and problem.free_duration and problem.actuator.limited:
+        likely = max(likely if problem.actuator.turning_limit() else 0.0, duration_of_point(point))
+    duration = duration or likely
+    control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
+    _, w0, _, w1 = turning_states(problem, duration)
+    if given is not None:
+        position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
+        place = None
+        ends = (w0, w1)
+        if point is not None:
+            linear = path_of_point(point, mesh, order, hold, None, duration)
+            ends = (np.append(linear.start_velocity, w0), np.append(linear.goal_velocity, w1))
+    else:
+        position = attitudes_along(problem, duration, fractions)
+        ends = (w0, w1)
+        place = None if point is None else path_of_point(point, mesh, order, hold, None, duration)
+    return joined(problem, place, (mesh, order, hold, duration, position, ends, control))

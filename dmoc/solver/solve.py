@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
-from dmoc.guess.turning import followed
+from dmoc.guess.starting import followed
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress

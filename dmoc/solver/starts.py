@@ -13,8 +13,7 @@ from dmoc.basics.quaternions import times, turned_by
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.past_zones import ways_past
-from dmoc.guess.starting import angle_around, starting_guess
-from dmoc.guess.turning import followed
+from dmoc.guess.starting import angle_around, followed, starting_guess
 from dmoc.motion.configuration import places_in, quaternions_in
 from dmoc.motion.path import DiscretePath, path_scales
 from dmoc.nlp.transcription import check_mesh
