@@ -37,7 +37,7 @@ HEAD = "| scenes | number | green | red | wrong | median s | worst s |\n|---|---
 # Seconds of processor time after which a solve is ended: a scene that takes longer counts as red.
 LONGEST = 12.0
 # A solve ends as well after so many times that on the clock [-], in what tells of no iterations.
-WAITED = 3.0
+WAITED = 5.0
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "free space": plain.free_space,
     "gravity and air": plain.falling,

@@ -47,8 +47,8 @@ HELD = 10.0
 MOST_HELD = 1e-3
 # Paths cost the same if their costs differ by less than this part of the tolerance [-].
 SAME_COST = 0.3
-# Where the change from mesh to mesh falls by less than this factor [-] all steps are cut, and not those alone
-# that make the error of the path: the error of the objective may come from others.
+# Where the cost changes more than the path, and that falls by less than this factor from mesh to mesh [-],
+# all steps are cut, and not those alone that make the error of the path.
 SLOW = 2.0
 # An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-]:
 # elsewhere both change alike.
@@ -173,7 +173,8 @@ class _Refinement:
         places = corners(self.problem, path, objective)
         most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
         fall = max(self.changes[-2]) / max(*self.changes[-1], TINY) if len(self.changes) > 1 else np.inf
-        return _cuts_of(path, errors, places, wanted, 2 if fall < SLOW else 1), most
+        slow = fall < SLOW and self.changes[-1][1] > self.changes[-1][0]
+        return _cuts_of(path, errors, places, wanted, 2 if slow else 1), most
 
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
