@@ -36,8 +36,8 @@ class Planner:
         """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
         if problem.inertia is not None:
             raise ValueError(
-                "functions of bodies that turn are not exported; from Python, transcribe(problem, steps) gives their "
-                "NLP, whose solve(problem, guess=solution) solves it again"
+                "functions of bodies that turn are not exported; from Python, transcribe(problem, steps) gives "
+                "their NLP, whose solve(problem, guess=solution) solves it again"
             )
         start = starting_guess(problem, check_mesh(steps), order, hold, guess)
         scene = Scene(problem, scheme(order), steps, hold)
