@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from dmoc.exports.functions import Exported, Scene
+from dmoc.exports.example import example_call, in_comment, macro_of
+from dmoc.exports.functions import Scene
 from dmoc.exports.planner import Planner
+from dmoc.exports.terms import Exported
 
 # What stands before CasADi's own code.
 PREFACE = """\
@@ -43,41 +43,6 @@ HEADER = """\
 #endif
 """
 
-# A program that calls two of them.
-EXAMPLE = """\
-/* Roll out a constant force from the start of {name}, then check the path that comes out.
-   Build and run: cc -O2 main.c functions.c -lm -o transfer && ./transfer */
-#include <math.h>
-#include <stdio.h>
-
-#include "transfer.h"
-
-static casadi_real position[DMOC_AXES] = {{{position}}}; /* m */
-static casadi_real velocity[DMOC_AXES] = {{{velocity}}}; /* m/s */
-static const casadi_real push[DMOC_CONTROLS] = {{{push}}}; /* N */
-static casadi_real forces[DMOC_CONTROLS * DMOC_FORCES];
-static casadi_real positions[DMOC_AXES * DMOC_NODES], velocities[DMOC_AXES * (DMOC_STEPS + 1)];
-static casadi_real defects[DMOC_AXES * DMOC_NODES];
-static casadi_real w[rollout_SZ_W + residual_SZ_W];
-static casadi_int iw[rollout_SZ_IW + residual_SZ_IW + 1];
-{numbers}
-
-int main(void) {{
-  const casadi_real *start[rollout_SZ_ARG] = {{{start}}};
-  const casadi_real *path[residual_SZ_ARG] = {{{path}}};
-  casadi_real *found[rollout_SZ_RES] = {{{found}}}, *rows[residual_SZ_RES] = {{defects}}, worst = 0;
-  for (int i = 0; i < DMOC_CONTROLS * DMOC_FORCES; ++i) forces[i] = push[i % DMOC_CONTROLS];
-  if (rollout(start, found, iw, w, 0) || residual(path, rows, iw, w, 0)) return 1;
-  for (int i = 0; i < DMOC_AXES * DMOC_NODES; ++i) worst = fmax(worst, fabs(defects[i]));
-  printf("position after %g s [m]:", duration[0]);
-  for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", positions[DMOC_AXES * (DMOC_NODES - 1) + i]);
-  printf("\\nvelocity [m/s]:");
-  for (int i = 0; i < DMOC_AXES; ++i) printf(" %.15g", velocities[DMOC_AXES * DMOC_STEPS + i]);
-  printf("\\nlargest residual of the path [N]: %.3g\\n", worst);
-  return 0;
-}}
-"""
-
 
 def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) -> None:
     """functions.c, functions.h, transfer.h and main.c of step, rollout and residual, in a folder."""
@@ -93,20 +58,23 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
     source.write_text(PREFACE + source.read_text())
     (folder / "transfer.h").write_text(_header(planner.scene, functions))
     by_name = {exported.function.name(): exported.function for exported in functions}
-    (folder / "main.c").write_text(_example_call(planner, by_name["rollout"], by_name["residual"]))
+    (folder / "main.c").write_text(example_call(planner, by_name["rollout"], by_name["residual"]))
 
 
 def _header(scene: Scene, functions: Sequence[Exported]) -> str:
     kind = "held over each step" if scene.hold else "at the nodes"
+    states = {macro_of(name)[5:]: size for name, size in scene.names("place").items()}
+    states |= {macro_of(name)[5:]: size for name, size in scene.names("speed").items()}
+    words = {"AXES": "axes", "QUATERNION": "entries of an attitude", "RATES": "entries of a rate"}
     sizes = {
-        "AXES": (scene.axes, "axes"),
+        **{name: (size, words[name]) for name, size in states.items()},
         "STEPS": (scene.steps, "steps"),
         "NODES": (scene.nodes, "nodes"),
         "CONTROLS": (scene.controls, ", ".join(scene.problem.actuator.labels(scene.axes))),
         "FORCES": (scene.shape("forces")[1], f"columns of forces, {kind}"),
     }
     return HEADER.format(
-        name=_in_comment(scene.problem.name),
+        name=in_comment(scene.problem.name),
         about=f"order {scene.rule.order}, {scene.steps} steps, forces {kind}",
         documentation="".join(_documentation(exported) for exported in functions),
         sizes="\n".join(f"#define DMOC_{name} {size} /* {words} */" for name, (size, words) in sizes.items()),
@@ -126,34 +94,3 @@ def _documentation(exported: Exported) -> str:
                 f"     {kind}[{i}] {name_of(i)} ({rows} x {columns}) [{term.unit or '-'}] {term.words}"
             )
     return "\n".join(lines) + "\n"
-
-
-def _example_call(planner: Planner, rollout: ca.Function, residual: ca.Function) -> str:
-    scene, guess = planner.scene, planner.guess
-    problem, force = scene.problem, 0.1 * planner.nlp.units.force
-    known = {"mass": problem.mass, "start_time": problem.start_time, "duration": guess.duration}
-    known |= {name: planner.numbers.value(name) for name in scene.flow.name_in()[1:]}
-    used = dict.fromkeys([*rollout.name_in(), *residual.name_in()])
-    numbers = [f"static casadi_real {name}[] = {{{_c_values(known[name])}}};" for name in used if name in known]
-    arrays = {"start_velocity": "velocity", "goal_velocity": "velocities + DMOC_AXES * DMOC_STEPS"}
-    if scene.burns:
-        numbers.append("static casadi_real masses[DMOC_NODES]; /* kg */")
-    push = [force if label in ("x", "throttle") else 0.0 for label in problem.actuator.labels(scene.axes)]
-    return EXAMPLE.format(
-        name=_in_comment(problem.name),
-        position=_c_values(guess.position[0]),
-        velocity=_c_values(guess.start_velocity),
-        push=_c_values(push if any(push) else [force, *push[1:]]),
-        numbers="\n".join(numbers),
-        start=", ".join(rollout.name_in()),
-        path=", ".join(arrays.get(name, name) for name in residual.name_in()),
-        found=", ".join(rollout.name_out()),
-    )
-
-
-def _c_values(values: Any) -> str:
-    return ", ".join(repr(float(value)) for value in np.atleast_1d(values))
-
-
-def _in_comment(text: str) -> str:
-    return text.replace("*/", "* /")

@@ -23,8 +23,8 @@ from dmoc.exports import functions as export_functions
 from dmoc.exports import planner as export_solver
 from dmoc.exports import residual as export_residual
 from dmoc.exports.code import write_code
-from dmoc.exports.functions import Exported
 from dmoc.exports.planner import Planner
+from dmoc.exports.terms import Exported
 from dmoc.motion.lobatto import scheme
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import DEFAULT_STEPS

@@ -1,67 +1,27 @@
 """The discrete equations as CasADi functions of their own: named arguments in SI units, nothing of dmoc needed.
 
-Arguments of all functions follow one vocabulary, `TERMS`. Matrices have one column a node, a step end
-or a step, so that what one function gives fits into the next. Every graph here is built from slices,
+Arguments of all functions follow one vocabulary, `dmoc.exports.terms`. Matrices have one column a node, a
+step end or a step, so that what one function gives fits into the next. Every graph here is built from slices,
 maps and accumulations: its size, and that of C code made from it, does not grow with the number of steps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Part, Term, named, number_terms
+from dmoc.motion.configuration import QUATERNION
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
 from dmoc.parts.rows import with_symbols
 from dmoc.scene.problem import TransferProblem
-
-
-@dataclass(frozen=True)
-class Term:
-    """Unit and meaning of an argument."""
-
-    unit: str
-    words: str
-
-
-@dataclass(frozen=True)
-class Exported:
-    """A function that leaves the package, and what its arguments mean beyond `TERMS`."""
-
-    function: ca.Function
-    words: str
-    terms: dict[str, Term] = field(default_factory=dict)
-
-    def term(self, name: str) -> Term:
-        return self.terms.get(name) or TERMS[name]
-
-
-# Unit and meaning of every argument that has one name in all functions.
-TERMS = {
-    "position": Term("m", "position"),
-    "velocity": Term("m/s", "velocity"),
-    "mass": Term("kg", "mass at the start"),
-    "next_position": Term("m", "position at the end of the step"),
-    "next_velocity": Term("m/s", "velocity at the end of the step"),
-    "next_mass": Term("kg", "mass at the end of the step"),
-    "time": Term("s", "time at the start of the step"),
-    "time_step": Term("s", "length of the step"),
-    "start_time": Term("s", "time at the start"),
-    "duration": Term("s", "duration of all steps"),
-    "positions": Term("m", "positions at the nodes, one column a node"),
-    "velocities": Term("m/s", "velocities at the step ends, one column an end"),
-    "start_velocity": Term("m/s", "velocity at the start"),
-    "goal_velocity": Term("m/s", "velocity at the goal"),
-    "forces": Term("N", "controls of the actuator, one column a node, or a step where they are held"),
-    "masses": Term("kg", "masses at the nodes, one column a node"),
-    "residual": Term("N", "force minus what the discrete motion needs, one column a node"),
-}
 
 
 @dataclass(frozen=True)
@@ -79,7 +39,40 @@ class Scene:
 
     @property
     def axes(self) -> int:
+        """Number of axes of space."""
         return self.problem.dimension
+
+    @property
+    def turns(self) -> bool:
+        """Whether there is an attitude among the coordinates."""
+        return bool(self.dynamics.configuration.surplus)
+
+    @cached_property
+    def parts(self) -> dict[Part, tuple[int, int]]:
+        """The parts of the body, and how many coordinates and velocities each has."""
+        blocks = self.dynamics.configuration.blocks
+        return {ATTITUDE if size == QUATERNION else PLACE: (size, min(size, 3)) for size in blocks}
+
+    def names(self, kind: str, prefix: str = "") -> dict[str, int]:
+        """What the parts of a column are called that is of one kind, a field of `Part`, and their sizes."""
+        which = 0 if kind in ("place", "places", "rows") else 1
+        return {prefix + getattr(part, kind): sizes[which] for part, sizes in self.parts.items()}
+
+    def joined(self, given: Mapping[str, ca.MX], kind: str, prefix: str = "") -> ca.MX:
+        """Coordinates or velocities, a column each, from the arguments that are their parts."""
+        return ca.vertcat(*[given[name] for name in self.names(kind, prefix)])
+
+    def parted(self, columns: ca.MX, kind: str, prefix: str = "") -> dict[str, ca.MX]:
+        """The parts of coordinates or velocities as arguments."""
+        return rows_of(columns, self.names(kind, prefix))
+
+    @cached_property
+    def terms(self) -> dict[str, Term]:
+        """What arguments of this scene mean where it is not what they mean in all."""
+        if not self.turns:
+            return {}
+        units = dict.fromkeys(self.problem.actuator.units(self.axes))
+        return {"forces": Term(", ".join(units), TERMS["forces"].words)}
 
     @property
     def controls(self) -> int:
@@ -103,9 +96,12 @@ class Scene:
         """Shape of an argument of `TERMS` that belongs to the whole path."""
         columns = self.steps if self.hold else self.nodes
         shapes = {"forces": (self.controls, columns), "masses": (1, self.nodes)}
-        shapes |= {"positions": (self.axes, self.nodes), "velocities": (self.axes, self.steps + 1)}
-        shapes |= dict.fromkeys(("position", "velocity", "start_velocity", "goal_velocity"), (self.axes, 1))
-        return shapes.get(name, (1, 1))
+        shapes["reactions"] = (self.dynamics.configuration.surplus, self.nodes)
+        shapes |= {path: (size, self.nodes) for path, size in self.names("places").items()}
+        shapes |= {path: (size, self.steps + 1) for path, size in self.names("speeds").items()}
+        states = self.names("place") | self.names("speed")
+        states |= self.names("speed", "start_") | self.names("speed", "goal_")
+        return shapes.get(name) or (states.get(name, 1), 1)
 
     def symbols(self, *names: str) -> dict[str, ca.MX]:
         return {name: ca.MX.sym(name, *self.shape(name)) for name in names}
@@ -145,14 +141,18 @@ class Scene:
         return [values[:, j : j + s * (self.steps - 1) + 1 : s] for j in range(s + 1)]
 
     def momentum(self, time: Any, position: Any, velocity: Any, mass: Any) -> Any:
-        """dl/dv [m/s]."""
+        """dl/dv [m/s]; of a body that turns Z' dl/dv, whose last entries are its spin [m^2/s]."""
+        if self.turns:
+            return self.dynamics.momentum(time, position, velocity, mass)
         return self.dynamics.point(time, position, velocity, mass)[1]
 
 
-def number_terms(names: Iterable[str]) -> dict[str, Term]:
-    """Further arguments that are numbers of the actuator."""
-    units = {"actuator_exhaust_velocity": "m/s"}
-    return {name: Term(units.get(name, ""), "of the actuator, as in the problem") for name in names}
+def rows_of(columns: ca.MX, sizes: Mapping[str, int]) -> dict[str, ca.MX]:
+    """Some rows for every name, in turn."""
+    if len(sizes) == 1:
+        return dict.fromkeys(sizes, columns)
+    pieces = ca.vertsplit(columns, np.cumsum([0, *sizes.values()]).tolist())
+    return dict(zip(sizes, pieces, strict=True))
 
 
 def march(scene: Scene) -> ca.Function:
@@ -162,12 +162,13 @@ def march(scene: Scene) -> ca.Function:
     velocity at its end. The constants, start_time, h, origin and the numbers of the flow, are one column: it
     is the same for all steps, and generated C code then needs no table with a copy of it for every step.
     """
-    n, rule, columns = scene.axes, scene.rule, scene.step_columns
-    state, stacked = ca.MX.sym("state", 2 * n + 2), ca.MX.sym("u", scene.controls * columns)
+    n, rule, columns = scene.dynamics.positions, scene.rule, scene.step_columns
+    p_end = n + scene.dynamics.freedom
+    state, stacked = ca.MX.sym("state", p_end + 2), ca.MX.sym("u", scene.controls * columns)
     lengths = np.cumsum([0, 1, 1, n, *(value.numel() for value in scene.flow_numbers().values())])
     same = ca.MX.sym("same", int(lengths[-1]))
     start_time, h, origin, *numbers = ca.vertsplit(same, lengths.tolist())
-    r, p, mass, count = ca.vertsplit(state, [0, n, 2 * n, 2 * n + 1, 2 * n + 2])
+    r, p, mass, count = ca.vertsplit(state, [0, n, p_end, p_end + 1, p_end + 2])
     u = ca.reshape(stacked, scene.controls, columns)
     masses = ca.repmat(mass, rule.degree + 1)
     if scene.burns:
@@ -188,38 +189,40 @@ def march(scene: Scene) -> ca.Function:
 
 def one_step(scene: Scene) -> Exported:
     """The one-step map."""
-    given = scene.symbols("position", "velocity", "mass", "time", "time_step")
+    given = scene.symbols(*scene.names("place"), *scene.names("speed"), "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
-    given |= scene.flow_numbers()
-    q, v, m, t, h, u, *numbers = given.values()
-    state = ca.vertcat(ca.MX.zeros(scene.axes), scene.momentum(t, q, v, m), m, 0)
-    end, _, _, velocity = march(scene)(state, ca.vec(u), ca.vertcat(t, h, q, *numbers))
-    outputs = {"next_position": q + end[: scene.axes], "next_velocity": velocity}
+    numbers = scene.flow_numbers()
+    given |= numbers
+    q, v = scene.joined(given, "place"), scene.joined(given, "speed")
+    m, t, h = given["mass"], given["time"], given["time_step"]
+    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), scene.momentum(t, q, v, m), m, 0)
+    same = ca.vertcat(t, h, q, *numbers.values())
+    end, _, _, velocity = march(scene)(state, ca.vec(given["forces"]), same)
+    outputs = scene.parted(q + end[: scene.dynamics.positions], "place", "next_")
+    outputs |= scene.parted(velocity, "speed", "next_")
     if scene.burns:
         outputs["next_mass"] = end[-2]
     function = named("step", given, outputs)
     words = "one step of the integrator; forces at its nodes, or one that is held"
-    terms = number_terms(scene.flow.name_in()[1:])
+    terms = scene.terms | number_terms(numbers)
     return Exported(function.expand() if scene.explicit else function, words, terms)
 
 
 def all_steps(scene: Scene) -> Exported:
     """The integrator over all steps from the start."""
-    given = scene.symbols("position", "velocity", "mass", "start_time", "duration", "forces")
-    given |= scene.flow_numbers()
-    q, v, m, t, duration, u, *numbers = given.values()
-    state = ca.vertcat(ca.MX.zeros(scene.axes), scene.momentum(t, q, v, m), m, 0)
+    state_names = *scene.names("place"), *scene.names("speed")
+    given = scene.symbols(*state_names, "mass", "start_time", "duration", "forces")
+    numbers = scene.flow_numbers()
+    given |= numbers
+    q, v = scene.joined(given, "place"), scene.joined(given, "speed")
+    m, t = given["mass"], given["start_time"]
+    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), scene.momentum(t, q, v, m), m, 0)
     steps = march(scene).mapaccum("march_all", scene.steps)
-    same = ca.vertcat(t, duration / scene.steps, q, *numbers)
-    _, moves, masses, speeds = steps(state, scene.split(u), same)
+    same = ca.vertcat(t, given["duration"] / scene.steps, q, *numbers.values())
+    _, moves, masses, speeds = steps(state, scene.split(given["forces"]), same)
     inner = ca.repmat(q, 1, scene.nodes - 1) + moves
-    outputs = {"positions": ca.horzcat(q, inner), "velocities": ca.horzcat(v, speeds)}
+    outputs = scene.parted(ca.horzcat(q, inner), "places") | scene.parted(ca.horzcat(v, speeds), "speeds")
     if scene.burns:
         outputs["masses"] = ca.horzcat(m, masses)
-    words = "the integrator over all steps, from position and velocity at the start"
-    return Exported(named("rollout", given, outputs), words, number_terms(scene.flow.name_in()[1:]))
-
-
-def named(name: str, given: dict[str, ca.MX], outputs: dict[str, ca.MX]) -> ca.Function:
-    """A function whose arguments are called as they are here; outputs of the values are dense."""
-    return ca.Function(name, list(given.values()), list(outputs.values()), list(given), list(outputs))
+    words = f"the integrator over all steps, from {' and '.join(state_names)} at the start"
+    return Exported(named("rollout", given, outputs), words, scene.terms | number_terms(numbers))

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.docstrings import documented
-from dmoc.exports.functions import Term
+from dmoc.exports.terms import Term
 from dmoc.nlp.solving import NLP
 from dmoc.parts.rows import title
 from dmoc.scene.problem import TransferProblem
@@ -24,6 +24,9 @@ from dmoc.scene.problem import TransferProblem
 HUGE = 2.0**100
 # The slopes found at plus and minus `HUGE` may differ by this relative error [-]; more means not affine.
 AFFINE = 1e-12
+# Fields whose arguments are called otherwise: an attitude has one name in all functions, and limits that of the
+# argument their part is made with.
+CALLED = {"quaternion": "attitude", "most_force": "force_limit", "most_torque": "torque_limit"}
 
 
 @dataclass(frozen=True)
@@ -118,12 +121,14 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
     stated = [field.name for field in fields(part)] if is_dataclass(part) else []
     entries = documented(type(part).__doc__)
     for field in dict.fromkeys([*stated, *part.adjustable]):
-        unit = entries[field].unit if field in entries else ""
+        called = CALLED.get(field, field)
+        documented_as = field if field in entries else called
+        unit = entries[documented_as].unit if documented_as in entries else ""
         value = getattr(part, field)
-        words = f"{field.replace('_', ' ')} of the {owner.replace('_', ' ')} ({type(part).__name__})"
+        words = f"{called.replace('_', ' ')} of the {owner.replace('_', ' ')} ({type(part).__name__})"
         if _is_number(value):
             free = "; entries that the problem leaves free are ignored" if None in np.atleast_1d(value) else ""
-            yield _number(part, field, f"{owner}_{field}", Term(unit, words + free), put)
+            yield _number(part, field, f"{owner}_{called}", Term(unit, words + free), put)
 
 
 def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], TransferProblem]) -> Number:

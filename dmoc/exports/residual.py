@@ -5,15 +5,17 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from dmoc.exports.functions import TERMS, Exported, Scene, Term, named
+from dmoc.exports.functions import Scene
+from dmoc.exports.terms import ATTITUDE, TERMS, Exported, Term, named
 from dmoc.motion.momenta import legendre_function
 
 
 def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
-    """P_0 .. P_s [m/s] of every step of a path, one column a step."""
+    """P_0 .. P_s [m/s] of every step of a path, of a body that turns Z'P, one column a step."""
     # positions relative to the first one: far from the origin, their differences would lose digits
-    h, origin = path["duration"] / scene.steps, path["positions"][:, 0]
-    q = ca.vertcat(*scene.at_nodes(path["positions"] - ca.repmat(origin, 1, scene.nodes)))
+    places = scene.joined(path, "places")
+    h, origin = path["duration"] / scene.steps, places[:, 0]
+    q = ca.vertcat(*scene.at_nodes(places - ca.repmat(origin, 1, scene.nodes)))
     m = ca.vertcat(*scene.at_nodes(path["masses"])) if scene.burns else ca.MX(0, scene.steps)
     same = ca.vertcat(h, origin, *([] if scene.burns else [path["mass"]]))
     times = step_times(scene.steps)(ca.vertcat(0, path["start_time"], h))[1]
@@ -31,29 +33,50 @@ def step_times(steps: int) -> ca.Function:
 
 
 def _momenta_kernel(scene: Scene) -> ca.Function:
-    """(q, m, u, t, (h, origin, the mass if it is constant)) -> P_0 .. P_s of one step."""
-    n, s = scene.axes, scene.rule.degree
+    """(q, m, u, t, (h, origin, the mass if it is constant)) -> P_0 .. P_s of one step, or Z'P."""
+    n, s = scene.dynamics.positions, scene.rule.degree
     q, u, t = ca.MX.sym("q", n * (s + 1)), ca.MX.sym("u", scene.controls * scene.step_columns), ca.MX.sym("t")
     m, same = ca.MX.sym("m", s + 1 if scene.burns else 0), ca.MX.sym("same", n + (1 if scene.burns else 2))
     masses = m if scene.burns else ca.repmat(same[-1], s + 1)
     function = legendre_function(scene.dynamics, scene.rule.order, scene.hold)
-    parts = function(q, masses, u, t, same[0], same[1 : n + 1])
+    h, origin = same[0], same[1 : n + 1]
+    parts = function(q, masses, u, t, h, origin)
+    if scene.turns:
+        along = _along(scene)
+        parts = [along(place + origin, part) for place, part in zip(ca.vertsplit(q, n), parts, strict=True)]
     return ca.Function("momenta", [q, m, u, t, same], parts).expand()
 
 
-def residual_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
-    """Defect of the discrete Euler-Lagrange equations at every node, as a force [N].
+def _along(scene: Scene) -> ca.Function:
+    """(q, a column of the size of q) -> Z(q)' times it."""
+    body = scene.dynamics.configuration
+    q, column = ca.SX.sym("q", body.size), ca.SX.sym("column", body.size)
+    return ca.Function("along", [q, column], [ca.densify(body.along(q, column))])
 
-    Each row is a momentum; over the time it acts for and times the mass it is a force.
+
+def residual_of(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
+    """Defect of the discrete Euler-Lagrange equations at every node, as a force [N] and a torque [N m].
+
+    Where the body turns, what breaks q.q = 1 is beside it.
     """
-    rule, n = scene.rule, scene.axes
-    q, start_time, duration = path["positions"], path["start_time"], path["duration"]
+    found = scene.parted(_defect(scene, path), "residual")
+    if scene.turns:
+        q = path[ATTITUDE.places]
+        found["residual_norm"] = ca.sum1(q * q) - 1
+    return found
+
+
+def _defect(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
+    """Each row is a momentum; over the time it acts for and times the mass it is a force."""
+    rule, n = scene.rule, scene.dynamics.freedom
+    q, start_time, duration = scene.joined(path, "places"), path["start_time"], path["duration"]
     masses = scene.at_nodes(path["masses"]) if scene.burns else [path["mass"]] * (rule.degree + 1)
     last_mass = path["masses"][-1] if scene.burns else path["mass"]
     h = duration / scene.steps
     parts = momenta(scene, path)
-    begin = scene.momentum(start_time, q[:, 0], path["start_velocity"], masses[0][0])
-    finish = scene.momentum(start_time + duration, q[:, -1], path["goal_velocity"], last_mass)
+    v0, v1 = (scene.joined(path, "speed", prefix) for prefix in ("start_", "goal_"))
+    begin = scene.momentum(start_time, q[:, 0], v0, masses[0][0])
+    finish = scene.momentum(start_time + duration, q[:, -1], v1, last_mass)
     arriving = ca.horzcat(begin, parts[-1][:, :-1])
     weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
     # at a node between two steps the force acts for the end of one and the beginning of the other, so its row
@@ -73,34 +96,44 @@ def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
 def path_symbols(scene: Scene) -> dict[str, ca.MX]:
     """Symbols for what the residual of a path is made of."""
     mass = "masses" if scene.burns else "mass"
-    names = ("positions", "start_velocity", "goal_velocity", "forces", mass, "start_time", "duration")
-    return scene.symbols(*names)
+    ends = *scene.names("speed", "start_"), *scene.names("speed", "goal_")
+    return scene.symbols(*scene.names("places"), *ends, "forces", mass, "start_time", "duration")
 
 
 def residual(scene: Scene) -> Exported:
     """The discrete Euler-Lagrange equations of a path."""
     path = path_symbols(scene)
     words = "discrete Euler-Lagrange equations of a path; at both ends with the momentum of the boundary state"
-    return Exported(named("residual", path, {"residual": residual_of(scene, path)}), words)
+    return Exported(named("residual", path, residual_of(scene, path)), words, scene.terms)
 
 
 def residual_jacobian(scene: Scene) -> Exported:
     """Derivatives of the residual by every argument."""
-    path = path_symbols(scene)
-    rows = ca.vec(residual_of(scene, path))
-    outputs = {f"by_{name}": ca.jacobian(rows, ca.vec(symbol)) for name, symbol in path.items()}
-    words = "derivative of the residual by {}, both stacked column after column"
-    units = {name: "N/({})" if "/" in TERMS[name].unit else "N/{}" for name in path}
-    terms = {f"by_{name}": Term(units[name].format(TERMS[name].unit), words.format(name)) for name in path}
+    path, outputs, terms = path_symbols(scene), {}, {}
+    for part, rows in residual_of(scene, path).items():
+        prefix = part.removeprefix("residual").lstrip("_") + "_" if part != "residual" else ""
+        for name, symbol in path.items():
+            slope = ca.jacobian(ca.vec(rows), ca.vec(symbol))
+            # the length of quaternions depends on nothing else
+            if part != "residual_norm" or slope.nnz():
+                outputs[f"{prefix}by_{name}"] = slope
+                terms[f"{prefix}by_{name}"] = _slope_term(scene, part, name)
     return Exported(named("residual_jacobian", path, outputs), "sparse derivatives of the residual", terms)
 
 
+def _slope_term(scene: Scene, part: str, name: str) -> Term:
+    above, below = TERMS[part].unit, (scene.terms.get(name) or TERMS[name]).unit
+    unit = f"{above}/({below})" if {"/", " "} & set(below) else f"{above}/{below}"
+    words = f"derivative of the {part.replace('_', ' ')} by {name}, both stacked column after column"
+    return Term(above if below == "-" else unit, words)
+
+
 def velocities_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
-    """Velocities at the step ends [m/s] from the discrete Legendre transforms."""
+    """Velocities at the step ends [m/s], then rates [rad/s], from the discrete Legendre transforms."""
     parts = momenta(scene, path)
     p = ca.horzcat(-parts[0], parts[-1][:, -1])
     times = path["start_time"] + path["duration"] * ca.DM(np.linspace(0, 1, scene.steps + 1)).T
     ends = slice(None, None, scene.rule.degree)
     mass = path["masses"][:, ends] if scene.burns else path["mass"]
     velocity = scene.dynamics.velocity.map(scene.steps + 1)
-    return velocity(times, path["positions"][:, ends], p, mass)
+    return velocity(times, scene.joined(path, "places")[:, ends], p, mass)
