@@ -46,7 +46,7 @@ DUAL_UNITS = {
 # How the control goes on from one node to the next.
 BETWEEN = (
     "; within a step the polynomial through its nodes or, where that breaks a limit, another control of the "
-    "same impulse within it: the polynomial drawn towards its mean, two constant pieces, or the values of the nodes"
+    "same impulse within it: the polynomial drawn to its mean, two constant pieces, or the values of the nodes"
 )
 
 

@@ -2,8 +2,8 @@
 
 What is flown between nodes is written here again from its documentation: the polynomial through the Lobatto
 nodes of a step or, where that breaks the limit by more than 1e-4 of it, that of three controls of the same
-impulse which keeps most of its first two moments: the polynomial drawn towards its mean, two constant pieces, or
-the value of each node for as long as its weight. With held forces it is one constant a step.
+impulse which keeps most of its first two moments: the polynomial drawn towards its mean, two constant pieces,
+or the value of each node for as long as its weight. With held forces it is one constant a step.
 """
 
 from collections.abc import Callable
@@ -113,7 +113,7 @@ def _within(
     """Ends of the pieces of a step, as fractions, and powers of each, where its polynomial breaks a limit."""
     mean, degree = weights @ nodes, len(points) - 1
     meeting, two = _two_pieces(push, mean, (weights * (points - 0.5)) @ nodes)
-    looked = np.vander(np.linspace(0, 1, 17), degree + 1, increasing=True) @ to_powers
+    looked = np.vander(np.linspace(0, 1, 129), degree + 1, increasing=True) @ to_powers
     drawn = mean + _share(push, mean, looked @ nodes - mean) * (nodes - mean)
     held = mean + _share(push, mean, nodes - mean) * (nodes - mean)
     ways = [
