@@ -25,8 +25,8 @@ from dmoc.motion.path import DiscretePath
 BREAKS = 1e-4
 # Places in a step at which the polynomial is held against the limit.
 LOOKED_AT = np.linspace(0.0, 1.0, 17)
-# Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less than
-# a hundred-thousandth.
+# Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less
+# than a hundred-thousandth.
 CLOSELY = np.linspace(0.0, 1.0, 129)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
