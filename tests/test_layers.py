@@ -21,6 +21,7 @@ LAYERS = [
     ["motion"],
     ["guess", "results"],
     ["nlp"],
+    ["diagnosis"],
     ["solver", "checks"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],

@@ -23,7 +23,7 @@ def stability(
     revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
     eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
     steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
-    turned: Annotated[int, typer.Option(help="Steps of the bodies that turn, at least 10.")] = 10_000,
+    turned: Annotated[int, typer.Option(help="Steps of the bodies that turn, at least 10.")] = 2_000,
     plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
     as_json: Json = False,
 ) -> None:

@@ -25,6 +25,9 @@ from dmoc.motion.path import DiscretePath
 BREAKS = 1e-4
 # Places in a step at which the polynomial is held against the limit.
 LOOKED_AT = np.linspace(0.0, 1.0, 17)
+# Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less
+# than a hundred-thousandth.
+CLOSELY = np.linspace(0.0, 1.0, 129)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
 # Halvings of the interval for how far apart the pieces may be: to a millionth.
@@ -126,7 +129,7 @@ def _moments(rule: Scheme, bounds: np.ndarray, pieces: np.ndarray) -> np.ndarray
 def _drawn_in(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The polynomial drawn towards its mean until it keeps the limit: nearly all of it where a thrust turns."""
     mean = np.einsum("j,jkn->kn", rule.weights, values)
-    apart = np.einsum("pj,jkn->pkn", rule.values_at(LOOKED_AT), values) - mean
+    apart = np.einsum("pj,jkn->pkn", rule.values_at(CLOSELY), values) - mean
     share = _share_within(dynamics, mean, apart[:, None])[0]
     bounds = np.broadcast_to([0.0, 1.0], (len(mean), 2))
     return bounds, (mean + share[:, None] * (values - mean))[:, None]

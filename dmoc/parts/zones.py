@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, matching_length, number, same_length, short, vector
 from dmoc.basics.digits import down
-from dmoc.effects.user_functions import as_column
+from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import off_centre, ways_round
 from dmoc.parts.outline import Ball, Box, Cone, Shape
@@ -153,6 +153,11 @@ class ApproachCone(Constraint):
     rounding: float = 1e-6
 
     def __post_init__(self) -> None:
+        for name in ("apex", "axis"):
+            if callable(part := getattr(self, name)):
+                tried(f"ApproachCone: {name}", part, [ca.SX.sym("t")], "it must take a CasADi time [s]")
+            elif self.moves:
+                vector(name, part, "m" if name == "apex" else "-")
         apex, axis = self._at(ca.SX.sym("t")) if self.moves else (self.apex, self.axis)
         if not self.moves:
             apex, axis = vector("apex", self.apex, "m"), vector("axis", self.axis, "-")

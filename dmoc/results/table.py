@@ -45,8 +45,8 @@ DUAL_UNITS = {
 
 # How the control goes on from one node to the next.
 BETWEEN = (
-    "; within a step the polynomial through its nodes or, where that breaks a limit, two constant pieces of "
-    "the same impulse and as much of its first moment as the limit allows"
+    "; within a step the polynomial through its nodes or, where that breaks a limit, another control of the "
+    "same impulse within it: the polynomial drawn to its mean, two constant pieces, or the values of the nodes"
 )
 
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
+from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.tube import in_tube, out_of_tube
@@ -22,8 +24,6 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.cause import Cause, confirmed_cause, idle_share
-from dmoc.solver.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
 from dmoc.solver.rung import Rung, answered, held_answer, rounded
 

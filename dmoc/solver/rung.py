@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.diagnosis.cause import Cause
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.cause import Cause
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].

@@ -1,8 +1,9 @@
 """The judge of an answer: NumPy and SciPy alone, nothing of the package that found it.
 
 What is flown between nodes is written here again from its documentation: the polynomial through the Lobatto
-nodes of a step or, where that breaks the limit by more than 1e-4 of it, two constant pieces of the same impulse
-which keep as much of its first moment as the limit allows. With held forces it is one constant a step.
+nodes of a step or, where that breaks the limit by more than 1e-4 of it, that of three controls of the same
+impulse which keeps most of its first two moments: the polynomial drawn towards its mean, two constant pieces,
+or the value of each node for as long as its weight. With held forces it is one constant a step.
 """
 
 from collections.abc import Callable
@@ -100,11 +101,51 @@ def flown(push: Push, solution: Any) -> tuple[np.ndarray, np.ndarray]:
             edges.append(mesh[k + 1])
             found.append(powers[k])
             continue
-        mean, moment = weights @ nodes[k], (weights * (points - 0.5)) @ nodes[k]
-        meeting, pieces = _two_pieces(push, mean, moment)
-        edges += [mesh[k] + meeting * (mesh[k + 1] - mesh[k]), mesh[k + 1]]
-        found += [np.vstack([piece, np.zeros((degree, len(piece)))]) for piece in pieces]
+        ends, pieces = _within(push, points, weights, nodes[k], to_powers)
+        edges += [mesh[k] + end * (mesh[k + 1] - mesh[k]) for end in ends[1:]]
+        found += list(pieces)
     return begin + duration * np.array(edges), np.array(found)
+
+
+def _within(
+    push: Push, points: np.ndarray, weights: np.ndarray, nodes: np.ndarray, to_powers: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the pieces of a step, as fractions, and powers of each, where its polynomial breaks a limit."""
+    mean, degree = weights @ nodes, len(points) - 1
+    meeting, two = _two_pieces(push, mean, (weights * (points - 0.5)) @ nodes)
+    looked = np.vander(np.linspace(0, 1, 129), degree + 1, increasing=True) @ to_powers
+    drawn = mean + _share(push, mean, looked @ nodes - mean) * (nodes - mean)
+    held = mean + _share(push, mean, nodes - mean) * (nodes - mean)
+    ways = [
+        (np.array([0.0, 1.0]), (to_powers @ drawn)[None]),
+        (np.array([0.0, meeting, 1.0]), _constant(two, degree)),
+        (np.append(0.0, np.cumsum(weights)), _constant(held, degree)),
+    ]
+    wanted = _moments(np.array([0.0, 1.0]), (to_powers @ nodes)[None], points, weights)
+    gaps = [np.abs(_moments(*way, points, weights) - wanted).sum() for way in ways]
+    ends, pieces = ways[int(np.argmin(gaps))]
+    ends[-1] = 1.0
+    return ends, pieces
+
+
+def _constant(values: np.ndarray, degree: int) -> np.ndarray:
+    """Constant pieces as powers, shape (pieces, degree+1, size)."""
+    return np.concatenate([values[:, None], np.zeros((len(values), degree, values.shape[1]))], axis=1)
+
+
+def _moments(ends: np.ndarray, pieces: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """First and second moment of a control about the middle of its step, by the quadrature of the scheme."""
+    lengths = np.diff(ends)
+    places = ends[:-1, None] + lengths[:, None] * points - 0.5
+    values = np.einsum("lp,kpn->kln", np.vander(points, pieces.shape[1], increasing=True), pieces)
+    return np.stack([np.einsum("k,l,kl,kln->n", lengths, weights, places**p, values) for p in (1, 2)])
+
+
+def _share(push: Push, mean: np.ndarray, apart: np.ndarray) -> float:
+    """How far controls, one row each, can leave their mean together within the limit, at most wholly [-]."""
+    shares = np.linspace(0, 1, 2001)
+    inside = (push.beyond(mean + shares[:, None, None] * apart) <= 1e-4).all(axis=1)
+    return float(shares[max(int(np.cumprod(inside).sum()) - 1, 0)])
 
 
 def _two_pieces(push: Push, mean: np.ndarray, moment: np.ndarray) -> tuple[float, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmoc.diagnosis.relaxable import LEAST, Relaxable
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.nlp.ipopt import Interrupt
@@ -14,7 +15,6 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.relaxable import LEAST, Relaxable
 
 # A limit is far off if the guess takes more than this many times as much on average [-]: in units of such a
 # limit the slacks are so large that no solver finds them.
