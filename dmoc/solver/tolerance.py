@@ -100,6 +100,8 @@ class _Found:
     error: Error
 
 
+
+
 class _Refinement:
     """The meshes after the first, each a refinement of the one before, and the best answer so far."""
 
@@ -205,7 +207,9 @@ class _Refinement:
             # With multipliers the barrier is so low that a switch moves from node to node.
             start = replace(rung.path, multipliers={})
             rung = self.ladder.try_on(start, most=MOST_HOLDING, pinned=begun.pinned, lean=lean)
-        if not rung.solved:
+        lost = self.problem.objective.sense * (rung.level.objective - begun.level.objective)
+        # Another optimum that costs a hundredth more is no better answer.
+        if not rung.solved or lost > 0.01 * abs(begun.level.objective):
             return begun
         none = np.ones(len(rung.nlp.mesh) - 1, int)
         moved = change((begun.path, begun.level.objective), (rung.path, rung.level.objective), none)

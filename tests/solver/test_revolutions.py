@@ -44,6 +44,7 @@ def test_a_wider_interval_never_costs_more(eccentricity):
     assert np.all(np.diff(costs) < 0)
 
 
+@pytest.mark.slow
 def test_a_tolerance_begins_from_the_same_answer():
     solution = solve(rendezvous(), tol=1e-3).raise_for_status()
     assert solution.objective == pytest.approx(phasing(2), rel=1e-3)

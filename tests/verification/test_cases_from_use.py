@@ -266,7 +266,7 @@ def test_a_weak_upper_stage():
     assert certified(weak_upper_stage()).objective == pytest.approx(1565.9, rel=1e-4)
 
 
-@pytest.mark.parametrize("numerics", [{}, {"tol": 1e-4}])
+@pytest.mark.parametrize("numerics", [{}, pytest.param({"tol": 1e-4}, marks=pytest.mark.slow)])
 def test_braking_at_the_moon(numerics):
     """The duration hardly matters, so that meshes differ by half a part in a thousand."""
     least = braking_by_an_impulse()
