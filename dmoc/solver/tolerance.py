@@ -100,8 +100,6 @@ class _Found:
     error: Error
 
 
-
-
 class _Refinement:
     """The meshes after the first, each a refinement of the one before, and the best answer so far."""
 
@@ -197,19 +195,16 @@ class _Refinement:
         return met
 
     def _released(self, rung: Rung) -> Rung:
-        """An answer on the same mesh that is an optimum, and not only the best one near another path.
-
-        Where it is another path of the same cost, no error of the mesh moved it.
-        """
+        """An optimum on the same mesh; where it is another path of the same cost, no error of the mesh moved it."""
         begun, lean = rung, self.lean
         while rung.solved and rung.pull > OFF_OPTIMUM:
             lean *= 0.1
             # With multipliers the barrier is so low that a switch moves from node to node.
             start = replace(rung.path, multipliers={})
             rung = self.ladder.try_on(start, most=MOST_HOLDING, pinned=begun.pinned, lean=lean)
-        lost = self.problem.objective.sense * (rung.level.objective - begun.level.objective)
+        cost, sense = begun.level.objective, self.problem.objective.sense
         # Another optimum that costs a hundredth more is no better answer.
-        if not rung.solved or lost > 0.01 * abs(begun.level.objective):
+        if not rung.solved or sense * (rung.level.objective - cost) > 0.01 * abs(cost):
             return begun
         none = np.ones(len(rung.nlp.mesh) - 1, int)
         moved = change((begun.path, begun.level.objective), (rung.path, rung.level.objective), none)
