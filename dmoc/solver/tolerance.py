@@ -195,7 +195,7 @@ class _Refinement:
         return met
 
     def _released(self, rung: Rung) -> Rung:
-        """An optimum on the same mesh; where it is another path of the same cost, no error of the mesh moved it."""
+        """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
         begun, lean = rung, self.lean
         while rung.solved and rung.pull > OFF_OPTIMUM:
             lean *= 0.1
