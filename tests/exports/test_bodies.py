@@ -253,6 +253,16 @@ def test_a_warm_start_goes_on_from_a_plan(case):
     assert abs(float(again["objective"]) / float(plan["objective"]) - 1) > 1e-4
 
 
+def test_a_solver_that_does_nothing_gives_back_its_guess(case):
+    setup = Planner.of(case.problem, **case.settings)
+    idle, given = solver(setup, {"ipopt.max_iter": 0}, warm=True).function, case.made["nominal"]()
+    plan = case.made["solver"](**given)
+    back = given | {f"guess_{name}": x for name, x in plan.items() if f"guess_{name}" in given}
+    again = idle(**back)
+    for name in setup.plan_names:
+        np.testing.assert_allclose(np.array(again[name]), np.array(plan[name]), atol=1e-7, err_msg=name)
+
+
 def test_less_mass_at_the_start_has_less_inertia():
     """Where propellant burns the inertia is in proportion to the mass, so a plan under way needs its own."""
     planner = Planner.of(BURNING, 2, 10, False)
