@@ -63,9 +63,9 @@ def export(
 
     A body that turns has an `attitude` (a unit quaternion from body axes to space axes, scalar first) and a
     `rate` [rad/s] in body axes beside position and velocity; where its attitude is all there is, no argument is
-    a place. Its residual is a force [N], a torque in body axes [N m] and q.q - 1; `largest_turn` [rad] between
-    neighbouring nodes is far below pi/2 in a plan that is right. The solver takes either sign of an attitude.
-    What is no argument, such as the inertia, is fixed.
+    a place. Its residual is a force [N], a torque in body axes [N m] and q.q - 1, with a largest of each;
+    `largest_turn` [rad] between neighbouring nodes is far below pi/2 in a plan that is right. The solver takes
+    either sign of an attitude. What is no argument, such as the inertia, is fixed.
 
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.

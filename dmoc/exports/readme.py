@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dmoc.exports.functions import Scene
+from dmoc.exports.terms import TERMS
 
 README = """\
 # Functions of {name}
@@ -17,13 +18,13 @@ Python, with CasADi alone:
     import casadi as ca
     nominal, solver = ca.Function.load("nominal.casadi"), ca.Function.load("solver.casadi")
     inputs = nominal()                     # the problem's own numbers and its guess, by name
-    inputs["mass"] = 12
+    inputs["mass"] *= 1.01                 # a little heavier than the problem states
     plan = solver(**inputs)
-    print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
+    print(plan["objective"], plan["{largest}"], plan["violation"], solver.stats()["return_status"])
 
-The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
+The solver always returns, whatever its status. A plan can be flown if {measures} and `violation`
 (of rows and bounds, scaled) are small; that it is an optimum only the status says. Where a plan fails,
-`residual` [N] shows for every node, `violations_...` for every bound and row, shaped like its multipliers.
+{shown} for every node, `violations_...` for every bound and row, shaped like its multipliers.
 
 Between nodes the control is the polynomial through the nodes of each step. Where that breaks a limit, as it may
 at a switch, hold the mean of the step's node values with the weights of the scheme: it has the same impulse.
@@ -52,5 +53,12 @@ example: `cc -O2 main.c functions.c -lm -o transfer && ./transfer`.
 
 def readme(scene: Scene, c: bool) -> str:
     """The text for a scene, with or without C code."""
-    body = TURNING if scene.turns else ""
-    return README.format(name=scene.problem.name, body=body, code=CODE if c else "")
+    parts = [(name, TERMS[name].unit) for name in scene.names("residual")]
+    return README.format(
+        name=scene.problem.name,
+        largest=f"largest_{parts[0][0]}",
+        measures=", ".join(f"`largest_{name}` [{unit}]" for name, unit in parts),
+        shown=", ".join(f"`{name}` [{unit}]" for name, unit in parts) + (" show" if parts[1:] else " shows"),
+        body=TURNING if scene.turns else "",
+        code=CODE if c else "",
+    )
