@@ -13,8 +13,8 @@ from dmoc.scene.problem import TransferProblem
 # largest off, at 5e-9 1e-6.
 LOOSEST = 5e-9
 # A body that turns is solved again after a change without these three aids of MUMPS, since all its unknowns are
-# near 1: 192 changed starts and masses of nine problems, by 1 % and by 10 %, took 2,575 iterations, not 2,577, and
-# 6 to 21 % less time.
+# near 1: 192 changed starts and masses of nine problems, by 1 % and by 10 %, took 2,575 iterations in place of
+# 2,577, and 6 to 21 % less time.
 QUICK = {
     "ipopt.mumps_scaling": 0,
     "ipopt.min_refinement_steps": 0,
