@@ -24,6 +24,7 @@ from dmoc.exports import planner as export_solver
 from dmoc.exports import residual as export_residual
 from dmoc.exports.code import write_code
 from dmoc.exports.planner import Planner
+from dmoc.exports.readme import readme
 from dmoc.exports.terms import Exported
 from dmoc.motion.lobatto import scheme
 from dmoc.scene.problem import TransferProblem
@@ -60,6 +61,12 @@ def export(
     loading. Where it fails, `residual` [N] and `violations_...` [-] say: the defect at every node, and each
     bound and row in the shape of its multipliers.
 
+    A body that turns has an `attitude` (a unit quaternion from body axes to space axes, scalar first) and a
+    `rate` [rad/s] in body axes beside position and velocity; where its attitude is all there is, no argument is
+    a place. Its residual is a force [N], a torque in body axes [N m] and q.q - 1, with a largest of each;
+    `largest_turn` [rad] between neighbouring nodes is far below pi/2 in a plan that is right. The solver takes
+    either sign of an attitude. What is no argument, such as the inertia, is fixed.
+
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.
 
@@ -82,7 +89,9 @@ def export(
         Where the solver starts from, as in `solve`. A Solution is best: `nominal` then holds a plan that
         `warm_solver` can go on from at once. The exported solver has one mesh, no ladder of coarser ones.
     options : dict, optional
-        CasADi `nlpsol` options of both solvers, for example {"ipopt.max_wall_time": 0.5}.
+        CasADi `nlpsol` options of both solvers, for example {"ipopt.max_wall_time": 0.5}, or where an
+        objective that is 1e-6 of itself too large is good enough {"ipopt.tol": 1e-8}: a warm start of twelve
+        thrusters then takes a quarter less time.
 
     Returns
     -------
@@ -106,7 +115,7 @@ def export(
         if c:
             (work / "c").mkdir()
             write_code(planner, functions[:3], work / "c")
-        (work / "README.md").write_text(README.format(name=problem.name, code=CODE if c else ""))
+        (work / "README.md").write_text(readme(planner.scene, c))
         files = sorted(path.relative_to(work) for path in work.rglob("*") if path.is_file())
         sums = {file.as_posix(): hashlib.sha256((work / file).read_bytes()).hexdigest() for file in files}
         plain = json.loads(json.dumps(_manifest(planner, functions, c, sums), default=_plain))
@@ -244,40 +253,3 @@ def _whole_folder(target: Path) -> Iterator[Path]:
         raise OSError(f"cannot export to {target}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
-
-
-README = """\
-# Functions of {name}
-
-`manifest.json` lists every function with shape, unit and meaning of its arguments, and the SHA-256 of every
-file here. All values are in SI units; matrices have one column a node, a step end or a step.
-
-A `.casadi` file is code: CasADi runs what it holds. Load one only if you trust where it comes from.
-
-Python, with CasADi alone:
-
-    import casadi as ca
-    nominal, solver = ca.Function.load("nominal.casadi"), ca.Function.load("solver.casadi")
-    inputs = nominal()                     # the problem's own numbers and its guess, by name
-    inputs["mass"] = 12
-    plan = solver(**inputs)
-    print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
-
-The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
-(of rows and bounds, scaled) are small; that it is an optimum only the status says. Where a plan fails,
-`residual` [N] shows for every node, `violations_...` for every bound and row, shaped like its multipliers.
-
-Between nodes the control is the polynomial through the nodes of each step. Where that breaks a limit, as it may
-at a switch, hold the mean of the step's node values with the weights of the scheme: it has the same impulse.
-
-To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too,
-moved on to the new times. What is no input of the solver is fixed in it.
-
-C++: `casadi::Function::load("solver.casadi")`, called with a `DMDict`. MATLAB and Octave:
-`solver = casadi.Function.load('solver.casadi'); plan = solver.call(nominal.call(struct()))`.
-{code}"""
-
-CODE = """
-C: `c/functions.c` needs nothing but the mathematical library; `c/transfer.h` documents it and `c/main.c` is an
-example: `cc -O2 main.c functions.c -lm -o transfer && ./transfer`.
-"""

@@ -180,7 +180,8 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
     outputs["violation"] = _largest(beyond, both)
     guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
-    name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of the positions")
+    places = " and ".join(scene.names("places"))
+    name, words = ("warm_solver", "from a former plan") if warm else ("solver", f"from a guess of the {places}")
     function = named(name, numbers | guesses, outputs)
     return Exported(function, f"Ipopt's solution of the transfer, {words}", _solver_terms(planner))
 

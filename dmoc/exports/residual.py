@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.exports.functions import Scene
-from dmoc.exports.terms import ATTITUDE, TERMS, Exported, Term, named
+from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.motion.momenta import legendre_function
 
 
@@ -109,9 +109,9 @@ def residual(scene: Scene) -> Exported:
 
 def residual_jacobian(scene: Scene) -> Exported:
     """Derivatives of the residual by every argument."""
-    path, outputs, terms = path_symbols(scene), {}, {}
+    path, outputs, terms = path_symbols(scene), {}, dict(scene.terms)
     for part, rows in residual_of(scene, path).items():
-        prefix = part.removeprefix("residual").lstrip("_") + "_" if part != "residual" else ""
+        prefix = "" if part == PLACE.residual else f"{part.removeprefix('residual_')}_"
         for name, symbol in path.items():
             slope = ca.jacobian(ca.vec(rows), ca.vec(symbol))
             # the length of quaternions depends on nothing else
