@@ -58,6 +58,13 @@ class Dynamics:
         """(t, q, v, m) -> dl/dq [m/s^2], dl/dv [m/s], F/m [m/s^2] of all effects and the kinetic energy."""
         return point_function(self.effects, self.configuration)
 
+    def step_point(self, degree: int, effects: tuple[Effect, ...] | None = None) -> ca.Function:
+        """`point` of all effects or of these as `step_momenta` takes it: see `kinetic_at_nodes`."""
+        kinetic = kinetic_at_nodes(self.configuration, degree)
+        if kinetic and effects is None:
+            return self.point
+        return point_function(self.effects if effects is None else effects, self.configuration, kinetic)
+
     @remembered_property
     def energy(self) -> ca.Function:
         """(t, q, w, m) -> v . dl/dv - l, the energy per unit mass [J/kg]."""
@@ -175,6 +182,11 @@ class Dynamics:
         parts = [ca.SX.zeros(axes) if force is None or not axes else force]
         parts.append(ca.SX.zeros(3) if torque is None else torque)
         return ca.Function("wrench", [q, u], [ca.densify(ca.vertcat(*parts))])
+
+
+def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
+    """Whether the kinetic energy of a step is taken from its nodes; else it is `step_inertia`."""
+    return not (configuration.surplus and degree == 1)
 
 
 def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:

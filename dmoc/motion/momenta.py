@@ -156,8 +156,10 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
         for j, (place, control) in enumerate(zip(nodes, controls, strict=True))
     ]
 
-    def point(t, r, v, m):
-        return dynamics.point(t, r + origin, v, m)
+    moving = dynamics.step_point(rule.degree)
 
-    momenta = step_momenta(rule, point, t, h, nodes, ca.vertsplit(m), push, body.blocks)
+    def point(t, r, v, m):
+        return moving(t, r + origin, v, m)
+
+    momenta = step_momenta(rule, point, t, h, nodes, ca.vertsplit(m), push, body, origin)
     return ca.Function("legendre", [q, m, u, t, h, origin], momenta)

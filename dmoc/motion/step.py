@@ -31,8 +31,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.configuration import places_in, quaternions_in
-from dmoc.motion.dynamics import Dynamics, actuation
+from dmoc.motion.configuration import Configuration, places_in
+from dmoc.motion.dynamics import Dynamics, actuation, kinetic_at_nodes
 from dmoc.motion.lobatto import Scheme
 
 
@@ -43,14 +43,22 @@ def step_velocities(scheme: Scheme, h, q: Sequence) -> list:
 
 
 def step_momenta(
-    scheme: Scheme, point: Callable, t0, h, q: Sequence, m: Sequence, push: Sequence, blocks: tuple = ()
+    scheme: Scheme,
+    point: Callable,
+    t0,
+    h,
+    q: Sequence,
+    m: Sequence,
+    push: Sequence,
+    body: Configuration | None = None,
+    origin: Any = 0,
 ) -> list:
     """P_0 .. P_s of one step [m/s].
 
     Parameters
     ----------
     point : Function
-        (t, q, v, m) -> dl/dq, dl/dv, F/m; see `point_function`.
+        (t, q, v, m) -> dl/dq, dl/dv, F/m; see `point_function` and, for a body, `Dynamics.step_point`.
     t0, h : scalar
         Start and length of the step [s].
     q : list of columns
@@ -59,24 +67,34 @@ def step_momenta(
         Masses there [kg].
     push : list of columns
         Actuator force per mass there [m/s^2].
-    blocks : tuple of int
-        As in `Configuration`, where there are attitudes among the coordinates.
+    body : Configuration, optional
+        A point mass if not given.
+    origin : column
+        Where the positions count from.
     """
     v = step_velocities(scheme, h, q)
     at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
+    acted = [h * w * (dldq + f + u) for w, (dldq, _, f), u in zip(scheme.weights, at, push, strict=True)]
+    if body is not None and not kinetic_at_nodes(body, scheme.degree):
+        inertial = body.step_inertia(h, [place + origin for place in q], q[1] - q[0], m[0])
+        slopes = [dldv for _, dldv, _ in at]
+        return [
+            moved + weighted(scheme.weights * scheme.derivative[:, j], slopes) + acted[j]
+            for j, moved in enumerate(inertial)
+        ]
     # dl/dv of a place is v plus the momentum that effects add. The sum over v is one constant matrix times the
     # displacements; the second part is zero for most effects.
     inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
     moves = [position - q[0] for position in q[1:]]
-    if quaternions_in(blocks):
-        places = ca.DM(places_in(blocks).astype(float))
+    if body is not None and body.surplus:
+        places = ca.DM(places_in(body.blocks).astype(float))
         v, moves = [velocity * places for velocity in v], [move * places for move in moves]
     added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
     return [
         weighted(inertia[j, 1:], moves) / h
         + weighted(scheme.weights * scheme.derivative[:, j], added)
-        + h * w * (dldq + force + push[j])
-        for j, (w, (dldq, _, force)) in enumerate(zip(scheme.weights, at, strict=True))
+        + acted[j]
+        for j in range(scheme.degree + 1)
     ]
 
 
@@ -120,7 +138,10 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     y = ca.SX.sym("y", n * s)
     moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
     nodes = [q, *[q + move for move in moves]]
-    momenta = step_momenta(scheme, point, t, h, nodes, m, push(nodes), body.blocks)
+    moving = dynamics.step_point(s)
+    momenta = step_momenta(
+        scheme, lambda t, r, v, m: moving(t, r + origin, v, m), t, h, nodes, m, push(nodes), body, origin
+    )
     rows = ca.Function(
         "rows", [y, *given], [_rows(dynamics, h, p, speed, [r + origin for r in nodes], momenta)]
     )

@@ -12,6 +12,14 @@ from dmoc.scene.problem import TransferProblem
 # Rounding loosens the tolerance to this at most [-]: at 2e-8 the costates of 140 revolutions are 3e-5 of the
 # largest off, at 5e-9 1e-6.
 LOOSEST = 5e-9
+# A body that turns is solved again after a change without these three aids of MUMPS, since all its unknowns are
+# near 1: 192 changed starts and masses of nine problems, by 1 % and by 10 %, took 2,575 iterations in place of
+# 2,577, and 6 to 21 % less time.
+QUICK = {
+    "ipopt.mumps_scaling": 0,
+    "ipopt.min_refinement_steps": 0,
+    "ipopt.fast_step_computation": "yes",
+}
 # Over very many revolutions propellant hardly depends on where it is burnt: the barrier begins with this
 # parameter [-], at which that little counts. From 1e-6 or 1e-4 on it takes 45 iterations, not 25.
 FLAT = 1e-9
@@ -90,6 +98,8 @@ def settings_for(
         pushed = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
         settings |= {"ipopt.warm_start_init_point": "yes", "ipopt.mu_init": 1e-6}
         settings |= {f"ipopt.warm_start_{name}": push for name in pushed}
+        if problem.inertia is not None and not carried:
+            settings |= QUICK
     return settings
 
 

@@ -117,13 +117,13 @@ class _Writer:
             actuation(body, self.actuator, place + self.origin, u[0]) / mass if self.hold else 0
             for place, mass in zip(r, m, strict=True)
         ]
-        moving = point_function(split_effects(problem.effects, body)[1], body)
+        moving = self.dynamics.step_point(rule.degree, split_effects(problem.effects, body)[1])
         t0 = self.start_time + begin * duration
 
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
 
-        momenta = step_momenta(rule, point, t0, h, r, m, push, body.blocks)
+        momenta = step_momenta(rule, point, t0, h, r, m, push, body, self.origin)
         for momentum, frame, at in zip(momenta, frames, nodes, strict=True):
             draft.add("dynamics", frame.T @ momentum, at)
         moves = [position - r[0] for position in r[1:]]
@@ -159,10 +159,10 @@ class _Writer:
         """
 
         def point(t, r, v, m):
-            return self.dynamics.point(t, r + self.origin, v, m)
+            return self.dynamics.step_point(self.rule.degree)(t, r + self.origin, v, m)
 
         body = self.dynamics.configuration
-        momenta = step_momenta(self.rule, point, t0, h, r, m, push, body.blocks)
+        momenta = step_momenta(self.rule, point, t0, h, r, m, push, body, self.origin)
         momenta = [body.along(q + self.origin, p) for q, p in zip(r, momenta, strict=True)]
         ends = ((t0, r[0], -momenta[0], m[0]), (t0 + h, r[-1], momenta[-1], m[-1]))
         found = []

@@ -131,8 +131,10 @@ class Pose(Turning):
 
     Parameters
     ----------
-    position, velocity : sequence of float or None
-        Of the centre of mass, in space axes [m], [m/s]; None frees all three entries.
+    position : sequence of float or None
+        Of the centre of mass, in space axes [m]; None frees all three entries.
+    velocity : sequence of float or None
+        Of the centre of mass, in space axes [m/s]; None frees all three entries.
     attitude : sequence of 4 floats or None
         Unit quaternion from body axes to space axes, scalar first [-]; None frees it. See `rotation`.
     rate : sequence of float or None
