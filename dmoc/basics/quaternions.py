@@ -15,6 +15,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+# A body that turns does so in a space of this many axes.
+AXES = 3
+# An attitude is a unit quaternion of this many entries.
+QUATERNION = 4
 # Two attitudes nearer to each other than this angle [rad] are joined by a straight line: the sine that slerp
 # divides by is then mere rounding.
 NEARLY_EQUAL = 1e-7

@@ -21,13 +21,8 @@ from dmoc.parts.rows import Row
 class _OfAttitude(Constraint):
     """What limits on the attitude share."""
 
-    @property
-    def turns_body(self) -> bool:
-        return True
-
-    @property
-    def moves_body(self) -> bool:
-        return False
+    turns_body: ClassVar[bool] = True
+    moves_body: ClassVar[bool] = False
 
     def seen(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return q[:, -4:], v[:, -3:]
@@ -35,17 +30,7 @@ class _OfAttitude(Constraint):
 
 @dataclass(frozen=True)
 class _Cone(_OfAttitude):
-    """A cone about a direction in space, and an axis of the body.
-
-    Parameters
-    ----------
-    axis : sequence of float
-        Direction in body axes [-]; made a unit vector.
-    direction : sequence of float, or function of the time
-        Direction in space axes [-]; made a unit vector. A function takes a CasADi time [s].
-    angle : float
-        Half angle of the cone [degrees], more than 0 and less than 180.
-    """
+    """What limits on where an axis of the body points share; their docstrings say what the fields are."""
 
     axis: Vector
     direction: Vector | Callable
@@ -186,9 +171,7 @@ class PointingKeepIn(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine > -1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return (
-            f"pointing keep-in {index} of at least {up(eased.angle)} degrees (you gave {self.angle:g} degrees)"
-        )
+        return f"pointing keep-in {index} of at least {up(eased.angle)} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()

@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, flag, number, short, times_each, vector
-from dmoc.bodies.torques import AXES, OnBody
+from dmoc.basics.quaternions import AXES
+from dmoc.bodies.torques import OnBody
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.engines import Burner
 

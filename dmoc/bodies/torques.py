@@ -10,22 +10,15 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, limits, number, short, times_each
 from dmoc.basics.digits import up
+from dmoc.basics.quaternions import AXES
 from dmoc.parts.actuator import Actuator
-
-# A body in space has these many axes.
-AXES = 3
 
 
 class OnBody(Actuator):
     """What actuators of rigid bodies share: their controls, squared and added up, are their effort."""
 
-    @property
-    def turns_body(self) -> bool:
-        return True
-
-    @property
-    def moves_body(self) -> bool:
-        return False
+    turns_body: ClassVar[bool] = True
+    moves_body: ClassVar[bool] = False
 
     def effort(self, u: Any) -> Any:
         return ca.dot(u, u)
@@ -123,6 +116,7 @@ class Wrench(OnBody):
     most_torque: float | Vector | None = None
     frame: str = "body"
     lever: float = 1.0
+    moves_body: ClassVar[bool] = True
     effort_unit: ClassVar[str] = "N^2 s"
 
     def __init__(
@@ -140,10 +134,6 @@ class Wrench(OnBody):
             checked(self, most_torque=_three("Wrench: torque limit", self.most_torque, "N m"))
         if self.frame not in ("body", "space"):
             raise ValueError(f"Wrench: frame must be 'body' or 'space'; got {short(self.frame)}")
-
-    @property
-    def moves_body(self) -> bool:
-        return True
 
     @property
     def structure(self) -> tuple:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -94,6 +94,11 @@ class Effect(Part, ABC):
     scheme, and which other effects there are: contributions are added up.
     """
 
+    # Whether it sees the attitude, so that it acts on rigid bodies alone.
+    turns_body: ClassVar[bool] = False
+    # Whether it needs the position of the body.
+    moves_body: ClassVar[bool] = True
+
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the effect has no meaning in this many dimensions."""
 
@@ -116,16 +121,6 @@ class Effect(Part, ABC):
     def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0."""
         return None, None
-
-    @property
-    def turns_body(self) -> bool:
-        """Whether it sees the attitude, so that it acts on rigid bodies alone."""
-        return False
-
-    @property
-    def moves_body(self) -> bool:
-        """Whether it needs the position of the body."""
-        return True
 
 
 class Conservative(Effect):
@@ -172,16 +167,14 @@ class BodyConservative(Effect):
     written by hand. It must not depend on the rate.
     """
 
+    turns_body: ClassVar[bool] = True
+
     @abstractmethod
     def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
         """Contribution to the Lagrangian per unit mass [J/kg]."""
 
     def lagrangian_of(self, t: Any, body: Body, m: Any) -> Any:
         return self.lagrangian(t, body, m)
-
-    @property
-    def turns_body(self) -> bool:
-        return True
 
 
 class BodyForce(Effect):
@@ -190,16 +183,14 @@ class BodyForce(Effect):
     Whoever implements one has the duties of a `Force`.
     """
 
+    turns_body: ClassVar[bool] = True
+
     @abstractmethod
     def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0."""
 
     def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         return self.wrench(t, body, m)
-
-    @property
-    def turns_body(self) -> bool:
-        return True
 
 
 def _in_words(value: Any, unit: str) -> str:

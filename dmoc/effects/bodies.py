@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -59,7 +59,7 @@ class GravityGradient(BodyConservative):
         return None
 
     @property
-    def moves_body(self) -> bool:
+    def moves_body(self) -> bool:  # type: ignore[override]
         return self.place is None
 
     def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
@@ -94,16 +94,14 @@ class PivotGravity(BodyConservative):
     acceleration: Vector
     arm: Vector
 
+    moves_body: ClassVar[bool] = False
+
     def __post_init__(self) -> None:
         checked(
             self,
             acceleration=_three("acceleration", self.acceleration, "m/s^2"),
             arm=_three("arm", self.arm, "m"),
         )
-
-    @property
-    def moves_body(self) -> bool:
-        return False
 
     def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
         return ca.dot(ca.DM(self.acceleration), body.rotation @ ca.DM(self.arm))
@@ -218,6 +216,8 @@ class PlateRadiation(BodyForce):
     flux: float = 1361.0
     reflectivity: float = 0.3
 
+    moves_body: ClassVar[bool] = False
+
     def __post_init__(self) -> None:
         _check_plates(self.plates)
         direction = np.array(_three("direction", self.direction, "-"))
@@ -231,10 +231,6 @@ class PlateRadiation(BodyForce):
         )
         if self.reflectivity > 1:
             raise ValueError(f"PlateRadiation: reflectivity must be 0 to 1 [-]; got {self.reflectivity:g}")
-
-    @property
-    def moves_body(self) -> bool:
-        return False
 
     def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         toward, mirror = body.rotation.T @ ca.DM(self.direction), self.reflectivity

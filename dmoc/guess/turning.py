@@ -30,7 +30,7 @@ UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 # The guess is bent off the axis of the turn by this angle [rad]. A turn about a principal axis is stationary,
 # though it need not be cheapest: in least time it is up to a tenth slower than the fastest (K. D. Bilimoria,
 # B. Wie, J. Guid. Control Dyn. 16, 1993), by the least effort a body tilts to an axis of less inertia.
-BENT = 0.6
+BENT = 0.1
 # A turn at its limit of torque is guessed to take this many times the least time that it could take [-].
 LEISURE = 1.2
 
@@ -134,25 +134,6 @@ def checked_turning(
     return position
 
 
-def joined(problem: TransferProblem, place: DiscretePath | None, guess: tuple) -> DiscretePath:
-    """The guess of a body from that of its centre, if it has one, and its attitudes and rates at the ends."""
-    mesh, order, hold, duration, position, rates, control = guess
-    start, goal = rates
-    if place is not None:
-        position = np.hstack([place.position, position])
-        start, goal = np.append(place.start_velocity, start), np.append(place.goal_velocity, goal)
-    body = configuration_of(problem)
-    for end, at in ((problem.start, 0), (problem.goal, -1)):
-        known = ~np.isnan(end.fixed()[0])
-        position[at, known] = end.fixed()[0][known]
-    first, last = (
-        np.where(np.isnan(end.fixed()[1]), guessed, end.fixed()[1])
-        for end, guessed in ((problem.start, start), (problem.goal, goal))
-    )
-    mass = np.full(len(position), problem.mass)
-    return DiscretePath(mesh, order, hold, duration, position, control, mass, first, last, blocks=body.blocks)
-
-
 def turning_guess(
     problem: TransferProblem, on: tuple, given: Any, duration: float | None, for_point: tuple
 ) -> DiscretePath:
@@ -176,16 +157,19 @@ def turning_guess(
         likely = max(likely if problem.actuator.turning_limit() else 0.0, duration_of_point(point))
     duration = duration or likely
     control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
-    _, w0, _, w1 = turning_states(problem, duration)
+    _, start, _, goal = turning_states(problem, duration)
+    place = None if point is None else path_of_point(point, mesh, order, hold, None, duration)
+    if place is not None:
+        start, goal = np.append(place.start_velocity, start), np.append(place.goal_velocity, goal)
     if given is not None:
         position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
-        place = None
-        ends = (w0, w1)
-        if point is not None:
-            linear = path_of_point(point, mesh, order, hold, None, duration)
-            ends = (np.append(linear.start_velocity, w0), np.append(linear.goal_velocity, w1))
     else:
         position = attitudes_along(problem, duration, fractions)
-        ends = (w0, w1)
-        place = None if point is None else path_of_point(point, mesh, order, hold, None, duration)
-    return joined(problem, place, (mesh, order, hold, duration, position, ends, control))
+        position = position if place is None else np.hstack([place.position, position])
+    ends = ((0, problem.start.fixed(), start), (-1, problem.goal.fixed(), goal))
+    for at, (fixed, _), _ in ends:
+        position[at] = np.where(np.isnan(fixed), position[at], fixed)
+    velocities = [np.where(np.isnan(fixed), guessed, fixed) for _, (_, fixed), guessed in ends]
+    mass = np.full(len(position), problem.mass)
+    on_mesh = mesh, order, hold, duration, position, control, mass
+    return DiscretePath(*on_mesh, velocities[0], velocities[1], blocks=body.blocks)

@@ -23,13 +23,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.quaternions import columns_of, rotation_of
+from dmoc.basics.quaternions import QUATERNION, columns_of, rotation_of
 from dmoc.effects.base import Body
 
 # Names of the axes of space.
 AXES = "xyz"
-# The entries of a unit quaternion, scalar first.
-QUATERNION = 4
 
 
 class Configuration(ABC):
@@ -95,9 +93,12 @@ class Configuration(ABC):
     def step_inertia(self, h: Any, q: Sequence, move: Any, m: Any) -> list:
         """Derivatives of the kinetic energy of a step of order 2 in its two nodes q, per unit mass [m/s].
 
-        `move` is the second less the first. Asked for where there are more coordinates than freedom.
+        `move` is the second less the first. Asked for where there are more coordinates than freedom; a
+        configuration whose rate is the same at both nodes has shorter expressions.
         """
-        raise NotImplementedError
+        (moved, first), (later, last) = (self.inertia(node, move / h, m) for node in q)
+        mean = 0.5 * (first + last)
+        return [0.5 * h * moved - mean, 0.5 * h * later + mean]
 
     def g(self, q: Any) -> Any:
         """The constraint g(q) = 0; no entries where the coordinates are free."""

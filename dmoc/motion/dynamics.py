@@ -172,6 +172,18 @@ class Dynamics:
         return bool(ca.depends_on(ca.SX(lagrangian), t))
 
     @remembered_property
+    def to_freedom(self) -> ca.Function:
+        """(q, column of the size of q) -> Z(q)' column."""
+        q, column = ca.SX.sym("q", self.positions), ca.SX.sym("column", self.positions)
+        return ca.Function("to_freedom", [q, column], [ca.densify(self.configuration.along(q, column))])
+
+    @remembered_property
+    def to_slopes(self) -> ca.Function:
+        """(q, w) -> dq/dt = Z(q) w."""
+        _, q, w, _, slopes = self.states()
+        return ca.Function("to_slopes", [q, w], [ca.densify(slopes)])
+
+    @remembered_property
     def wrench(self) -> ca.Function:
         """(q, u) -> the force in space axes [N] and, for a rigid body, the torque in body axes [N m]."""
         q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)

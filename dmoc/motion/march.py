@@ -37,7 +37,7 @@ class Trajectory:
     attitude : array, shape (steps+1, 4), or None
         Unit quaternion of a rigid body, scalar first, from body to space.
     rate, spin : arrays, shape (steps+1, 3), or None
-        Angular rate [rad/s] and angular momentum [kg m^2/s] of a rigid body, in body axes.
+        Angular rate [rad/s] and angular momentum per unit mass [m^2/s] of a rigid body, in body axes.
     mass : array, shape (steps+1,)
         [kg].
     energy : array, shape (steps+1,)
@@ -117,7 +117,7 @@ def simulate(
     trajectory = Trajectory(time, q[:, places], v[:, speeds], p[:, speeds], mass, energy)
     if places.all():
         return trajectory
-    return replace(trajectory, attitude=q[:, ~places], rate=v[:, ~speeds], spin=mass[:, None] * p[:, ~speeds])
+    return replace(trajectory, attitude=q[:, ~places], rate=v[:, ~speeds], spin=p[:, ~speeds])
 
 
 def _path_at_start(

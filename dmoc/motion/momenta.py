@@ -38,22 +38,12 @@ def end_momenta(
 
 def along_path(dynamics: Dynamics, position: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Z(q)' of columns of the size of q, one row a place: what moves the body and not its constraint."""
-    body = dynamics.configuration
-    if not body.surplus:
-        return columns
-    q, column = ca.SX.sym("q", body.size), ca.SX.sym("column", body.size)
-    function = ca.Function("along", [q, column], [ca.densify(body.along(q, column))])
-    return function(position.T, columns.T).full().T
+    return dynamics.to_freedom(position.T, columns.T).full().T if dynamics.configuration.surplus else columns
 
 
 def velocity_along(dynamics: Dynamics, position: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """dq/dt = Z(q) w of places and independent velocities, one row each."""
-    body = dynamics.configuration
-    if not body.surplus:
-        return rates
-    q, w = ca.SX.sym("q", body.size), ca.SX.sym("w", body.freedom)
-    function = ca.Function("velocity", [q, w], [ca.densify(body.velocity(q, w))])
-    return function(position.T, rates.T).full().T
+    return dynamics.to_slopes(position.T, rates.T).full().T if dynamics.configuration.surplus else rates
 
 
 def rates_along(dynamics: Dynamics, position: np.ndarray, slopes: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 
 from dmoc.basics.arguments import LARGEST, number
 from dmoc.basics.numerics import cubic_spline
-from dmoc.basics.quaternions import angle_between, normalised, times
-from dmoc.motion.configuration import QUATERNION, places_in, quaternions_in, speeds_in
+from dmoc.basics.quaternions import QUATERNION, angle_between, normalised, times
+from dmoc.motion.configuration import places_in, quaternions_in, speeds_in
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
 

@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.basics.quaternions import conjugate, rotation_vectors
+from dmoc.basics.quaternions import QUATERNION, conjugate, rotation_vectors
 from dmoc.basics.quaternions import times as multiplied
-from dmoc.motion.configuration import QUATERNION, places_in
+from dmoc.motion.configuration import places_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme

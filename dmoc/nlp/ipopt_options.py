@@ -66,18 +66,7 @@ def settings_for(
         "ipopt.acceptable_obj_change_tol": 1e-10,
         "ipopt.max_iter": 1000,
     }
-    if curved:
-        # Over very many revolutions the steps must be more exact: with MUMPS' other orderings, or without its
-        # matching, errors look like negative curvature, and 64 iterations were taken instead of two.
-        settings["ipopt.mumps_pivot_order"] = 5
-        # With MUMPS' own choice of scaling pivots are delayed: 48 s went into one iteration on 970 steps, and
-        # with rows and columns scaled in turn 8 s into all 24.
-        settings["ipopt.mumps_scaling"] = 8
-    elif problem.limited:
-        # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
-        settings["ipopt.mumps_permuting_scaling"] = 0
-        if len(mesh) > 1000:
-            settings["ipopt.mumps_pivot_order"] = 5
+    settings |= _linear_solver(problem, mesh, curved)
     settings |= {} if curved else _barrier(problem, warm, carried)
     if (
         problem.limited
@@ -100,6 +89,24 @@ def settings_for(
         settings |= {f"ipopt.warm_start_{name}": push for name in pushed}
         if problem.inertia is not None and not carried:
             settings |= QUICK
+    return settings
+
+
+def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> dict[str, Any]:
+    """Options for MUMPS, which solves the linear systems."""
+    settings: dict[str, Any] = {}
+    if curved:
+        # Over very many revolutions the steps must be more exact: with MUMPS' other orderings, or without its
+        # matching, errors look like negative curvature, and 64 iterations were taken instead of two.
+        settings["ipopt.mumps_pivot_order"] = 5
+        # With MUMPS' own choice of scaling pivots are delayed: 48 s went into one iteration on 970 steps, and
+        # with rows and columns scaled in turn 8 s into all 24.
+        settings["ipopt.mumps_scaling"] = 8
+    elif problem.limited:
+        # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
+        settings["ipopt.mumps_permuting_scaling"] = 0
+        if len(mesh) > 1000:
+            settings["ipopt.mumps_pivot_order"] = 5
     return settings
 
 

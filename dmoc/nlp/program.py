@@ -110,8 +110,8 @@ class Program:
             position, velocity = getattr(problem, end).fixed()
             for group in self.rows.groups:
                 if group.name == CONSTRAINT:
-                    low[group.indices[~_open(self.dynamics, position), place]] = -np.inf
-                    high[group.indices[~_open(self.dynamics, position), place]] = np.inf
+                    met = group.indices[~_open(self.dynamics, position), place]
+                    low[met], high[met] = -np.inf, np.inf
                 elif group.kind == "node" and not np.isnan(position).any():
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 if group.owner and group.owner.end == end and not np.isnan(velocity).any():

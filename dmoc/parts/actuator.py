@@ -55,6 +55,10 @@ class Actuator(ABC):
     smoothing: float | None = None
     # Whether it is off for parts of a usual transfer: pictures then shade the times when it is on.
     coasts: ClassVar[bool] = False
+    # Whether it acts on rigid bodies alone.
+    turns_body: ClassVar[bool] = False
+    # Whether it needs a body with a position.
+    moves_body: ClassVar[bool] = True
     # The unit of what `Effort` gives with it.
     effort_unit: ClassVar[str] = "N^2 s"
     # Pictures label the line at the force limit with this.
@@ -100,16 +104,6 @@ class Actuator(ABC):
         """The square that `Effort` integrates: of the force or, where it turns the body, of all controls."""
         force = self.force(u)
         return ca.dot(force, force)
-
-    @property
-    def turns_body(self) -> bool:
-        """Whether it acts on rigid bodies alone."""
-        return False
-
-    @property
-    def moves_body(self) -> bool:
-        """Whether it needs a body with a position."""
-        return True
 
     def torque_limit(self) -> float | None:
         """The largest torque [N m] about one axis, or None if there is no limit or no torque."""

@@ -52,6 +52,10 @@ class Constraint(ABC):
 
     unit: ClassVar[str] = "m"
     adjustable: ClassVar[tuple[str, ...]] = ()
+    # Whether it looks at the attitude, so that it limits rigid bodies alone.
+    turns_body: ClassVar[bool] = False
+    # Whether it needs a body with a position.
+    moves_body: ClassVar[bool] = True
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the constraint has no meaning in this many dimensions."""
@@ -78,16 +82,6 @@ class Constraint(ABC):
         Those of the position by default: the first three of a body that turns.
         """
         return q[:, :3], v[:, :3]
-
-    @property
-    def turns_body(self) -> bool:
-        """Whether it looks at the attitude, so that it limits rigid bodies alone."""
-        return False
-
-    @property
-    def moves_body(self) -> bool:
-        """Whether it needs a body with a position."""
-        return True
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         """Plain bounds of the position [m]."""

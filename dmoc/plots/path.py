@@ -50,7 +50,9 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
         draw_triads(axes, solution, size)
     if solution.dimension == 3:
         floor = np.full(len(path), view[0][2])
-        axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label="its shadow", zorder=0)
+        # Beside the axes of a body there is no room for its entry in the legend.
+        shadow = "_shadow" if solution.path.attitudes else "its shadow"
+        axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label=shadow, zorder=0)
         # The order is given, since matplotlib would hide the path behind surfaces that it passes in front of.
         axes.computed_zorder = False
     _frame(axes, view, unit)
@@ -207,7 +209,8 @@ def _legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
     if beside:
         axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0))
         return
-    columns = 3 if len(labels) > 4 else 4
+    # Three rows would reach into the line below the panels.
+    columns = 3 if 4 < len(labels) <= 6 else 4
     below = -0.06 if axes.name == "3d" else -0.11
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
 

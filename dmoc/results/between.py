@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmoc.basics.quaternions import normalised
-from dmoc.motion.configuration import QUATERNION, places_in
+from dmoc.basics.quaternions import QUATERNION, normalised
+from dmoc.motion.configuration import places_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath

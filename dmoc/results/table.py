@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.files import AGAIN
-from dmoc.motion.configuration import QUATERNION, speeds_in
+from dmoc.basics.quaternions import QUATERNION
+from dmoc.motion.configuration import speeds_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance

@@ -8,12 +8,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
-from dmoc.basics.quaternions import rotation_of
+from dmoc.basics.quaternions import AXES, QUATERNION, rotation_of
 from dmoc.effects.base import Body
 from dmoc.scene.ends import Boundary
-
-# An inertia has so many principal moments.
-AXES = 3
 
 
 def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
@@ -107,7 +104,7 @@ def check_acts_on(part: Any, turns: bool, moves: bool) -> None:
 def check_body_effect(effect: Any, inertia: Any) -> None:
     """Raise ValueError if a user's own effect on a body gives another number of values than it must."""
     place, velocity, rate = (ca.SX.sym(name, AXES) for name in ("q", "v", "w"))
-    attitude = ca.SX.sym("attitude", 4)
+    attitude = ca.SX.sym("attitude", QUATERNION)
     body = Body(place, velocity, attitude, rotation_of(attitude), rate, np.array(inertia))
     name, t, m = type(effect).__name__, ca.SX.sym("t"), ca.SX.sym("m")
     try:

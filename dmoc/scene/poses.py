@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, Vector, checked, entries, flag, number, short, vector
-from dmoc.basics.quaternions import rotation_vectors
+from dmoc.basics.quaternions import AXES, QUATERNION, rotation_vectors
 from dmoc.scene.ends import Boundary, State
 
 # A quaternion may be longer or shorter than 1 by this part before it is refused [-]: numbers that were written
 # with four digits are made unit quaternions, others are probably no attitudes.
 NEARLY_UNIT = 1e-3
-# A body in space has these many axes.
-AXES = 3
 
 
 def rotation(axis: Vector, degrees: float) -> tuple[float, float, float, float]:
@@ -60,23 +59,24 @@ class Turning(Boundary):
         return True
 
     @property
+    @abstractmethod
     def _attitude(self) -> np.ndarray:
         """Unit quaternion; NaN where it is free."""
-        raise NotImplementedError
 
     def oriented(self, start: Boundary) -> Turning:
         """The same goal with the sign of its quaternion that the turn from a start leads to.
 
         q and -q are one attitude; the shorter way from the start ends at the one with q_start . q >= 0.
         """
-        known = getattr(start, "_attitude", np.full(4, np.nan))
+        known = getattr(start, "_attitude", np.full(QUATERNION, np.nan))
         along = float(known @ self._attitude)
         if np.isnan(along) or (along < 0) == self.other_way:
             return self
         return self._opposite()
 
+    @abstractmethod
     def _opposite(self) -> Turning:
-        raise NotImplementedError
+        """The same with the other sign of its quaternion."""
 
     def the_other_way(self) -> Turning:
         """The same goal, reached the other way round."""
@@ -113,7 +113,7 @@ class Attitude(Turning):
 
     @property
     def _attitude(self) -> np.ndarray:
-        return _known(self.quaternion, 4)
+        return _known(self.quaternion)
 
     def _opposite(self) -> Attitude:
         return replace(self, quaternion=tuple(-x for x in self.quaternion or ()) or None)
@@ -168,7 +168,7 @@ class Pose(Turning):
 
     @property
     def _attitude(self) -> np.ndarray:
-        return _known(self.attitude, 4)
+        return _known(self.attitude)
 
     def _opposite(self) -> Pose:
         return replace(self, attitude=tuple(-x for x in self.attitude or ()) or None)
@@ -190,7 +190,7 @@ def _quaternion(value: Any) -> tuple[float, ...] | None:
     if value is None:
         return None
     parts = entries(value)
-    if parts is None or len(parts) != 4:
+    if parts is None or len(parts) != QUATERNION:
         raise ValueError(
             "an attitude must be a unit quaternion of 4 numbers, scalar first [-], as rotation(axis, degrees) "
             f"gives, or None; got {short(value)}"
@@ -211,8 +211,8 @@ def _rate(value: Any) -> tuple[float | None, ...]:
     return rate
 
 
-def _known(quaternion: Any, size: int) -> np.ndarray:
-    return np.full(size, np.nan) if quaternion is None else np.array(quaternion, float)
+def _known(quaternion: Any) -> np.ndarray:
+    return np.full(QUATERNION, np.nan) if quaternion is None else np.array(quaternion, float)
 
 
 def _attitude_words(attitude: np.ndarray) -> str:
