@@ -168,7 +168,7 @@ class Evidence:
 
     @cached_property
     def turn(self) -> float:
-        """Largest angle by which the body is turned from its start [rad]; 1 rad for one that does not turn."""
+        """Largest angle by which the body is turned from its start [rad]; 1 rad for a point mass."""
         return path_scales(self.path).turn
 
     @cached_property

@@ -134,11 +134,11 @@ def turn_cuts(
         return
     rule, steps = scheme(path.order), len(path.mesh) - 1
     attitude, at = path.attitudes[0], step_nodes(steps, rule)
-    inner = rule.values_at(np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1])
-    inside = normalised(np.einsum("pj,jkn->kpn", inner, attitude[at])).reshape(-1, QUATERNION)
-    h = np.diff(path.mesh)[:, None]
-    fractions = (path.mesh[:-1, None] + h * np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]).ravel()
-    times = start_time + path.duration * np.array(path.fractions)
+    places = np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]
+    found = np.einsum("pj,jkn->kpn", rule.values_at(places), attitude[at])
+    inside = normalised(found).reshape(-1, QUATERNION)
+    fractions = (path.mesh[:-1, None] + np.diff(path.mesh)[:, None] * places).ravel()
+    times = start_time + path.duration * path.fractions
     turned, none = path.largest_turn, np.empty(0, int)
     sway = 0.5 * _bump(path, rates)
     for i, constraint in ours:

@@ -24,8 +24,8 @@ TINY = float(np.finfo(float).tiny)
 def unpriced(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, objective: float) -> float:
     """By how much the control that is flown costs more or less than the objective, over it [-].
 
-    They differ where the polynomial through the nodes of a step breaks the limit of the actuator and two
-    constant pieces of the same impulse are flown: the integral of their square is not the sum over the nodes.
+    They differ where the polynomial through the nodes of a step breaks the limit of the actuator and another
+    control of the same impulse is flown: the integral of its square is not the sum over the nodes.
     """
     if path.hold or path.order == 2:
         return 0.0

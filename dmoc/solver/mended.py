@@ -166,8 +166,8 @@ def onto_goal(
 def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
     """An answer whose objective is what the control costs that is flown.
 
-    A step in which the polynomial through its nodes breaks the limit of the actuator is flown in two pieces of
-    another price: such steps are cut in four, if need be more than once.
+    A step in which the polynomial through its nodes breaks the limit of the actuator is flown at another price:
+    such steps are cut in four, if need be more than once.
     """
     begun = rung
     for _ in range(MOST_FINER):
