@@ -25,9 +25,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dmoc import State, TransferProblem
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects import Force
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics, specific_lagrangian
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.units import units_of

@@ -7,7 +7,6 @@ import numpy as np
 
 from dmoc.basics.quaternions import rotated
 from dmoc.checks.evidence import Evidence
-from dmoc.motion.configuration import quaternions_in
 from dmoc.motion.dynamics import specific_lagrangian, state_symbols
 from dmoc.motion.march import wrench_of
 from dmoc.motion.momenta import along_path, rates_along
@@ -33,17 +32,17 @@ def balance(evidence: Evidence) -> tuple[float, float]:
     gross = float(np.abs(given[:, speeds]).sum()) + evidence.speed
     off = np.abs(change - given.sum(axis=0))
     error = off[speeds].max(initial=0.0) / gross
-    if not speeds.all():
-        spins = float(np.abs(given[:, ~speeds]).sum()) + evidence.spin
-        error = max(error, off[~speeds].max() / spins)
+    if evidence.rates.any():
+        spins = float(np.abs(given[:, evidence.rates]).sum()) + evidence.spin
+        error = max(error, off[evidence.rates].max() / spins)
     return float(error), gross
 
 
 def _in_space(evidence: Evidence, position: np.ndarray, momenta: np.ndarray) -> np.ndarray:
     """Momenta, one row a place, with the spins turned from body into space axes."""
     found = momenta.copy()
-    for at in quaternions_in(evidence.path.parts):
-        found[:, ~evidence.speeds] = rotated(position[:, at], momenta[:, ~evidence.speeds])
+    for at in evidence.path.coordinates.quaternions:
+        found[:, evidence.rates] = rotated(position[:, at], momenta[:, evidence.rates])
     return found
 
 

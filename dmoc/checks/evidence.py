@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics, point_function
 from dmoc.motion.flown import Flown, flown
 from dmoc.motion.lobatto import scheme
@@ -22,7 +21,7 @@ from dmoc.motion.momenta import (
     step_matrices,
     velocity_along,
 )
-from dmoc.motion.path import Scales, path_scales
+from dmoc.motion.scales import Scales, path_scales, wheel_momentum
 from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
@@ -47,7 +46,7 @@ class Evidence:
         self.wrench = force_of(self.dynamics, self.path)
         self.momenta = legendre_momenta(self.dynamics, self.path, self.begin)
         self.momentum, self.velocity = end_momenta(self.dynamics, self.path, self.begin, self.momenta)
-        self.speeds = speeds_in(self.path.parts)
+        self.speeds, self.rates = self.path.coordinates.speeds, self.path.coordinates.rates
 
     def undefined(self) -> str:
         """The names of the arrays that hold a number that is not finite; empty if there is none."""
@@ -143,7 +142,7 @@ class Evidence:
     @cached_property
     def largest_torque(self) -> float:
         """Largest component of the torque used [N m]."""
-        return float(np.abs(self.wrench[:, ~self.speeds]).max(initial=0.0))
+        return float(np.abs(self.wrench[:, self.rates]).max(initial=0.0))
 
     @property
     def force(self) -> np.ndarray:
@@ -174,20 +173,20 @@ class Evidence:
     @cached_property
     def rate(self) -> float:
         """Largest angular rate at the step ends [rad/s]; at least what makes the turn in the duration."""
-        rates = np.linalg.norm(self.velocity[:, ~self.speeds], axis=1)
+        rates = np.linalg.norm(self.velocity[:, self.rates], axis=1)
         return max(float(rates.max()), self.turn / self.path.duration)
 
     @cached_property
     def spin(self) -> float:
         """Largest angular momentum per unit mass at the step ends [m^2/s]; at least of the largest rate."""
-        spins = np.linalg.norm(self.momentum[:, ~self.speeds], axis=1)
+        spins = np.linalg.norm(self.momentum[:, self.rates], axis=1)
         moment = 0.0 if self.problem.inertia is None else float(np.trace(self.problem.inertia)) / 3
         return max(float(spins.max()), moment * self.rate / float(self.mass[0])) or 1.0
 
     @cached_property
     def torque_scale(self) -> float:
         """The torque that errors are judged by [N m]: of the actuator, of the scene, or what turns the body."""
-        pulled = [np.abs(load[:, ~self.speeds]).max(initial=0.0) for load in self.loads]
+        pulled = [np.abs(load[:, self.rates]).max(initial=0.0) for load in self.loads]
         scene = float(self.mass.max()) * max(*pulled, self.spin / self.path.duration)
         return max(self.problem.actuator.torque_limit() or 0.0, self.largest_torque, 1e-3 * scene) or 1.0
 
@@ -199,7 +198,15 @@ class Evidence:
     @property
     def scales(self) -> Scales:
         """The sizes that errors are judged by."""
-        return Scales(self.extent, self.speed, self.turn, self.rate, tuple(self.path.parts))
+        return Scales(
+            self.extent,
+            self.speed,
+            self.turn,
+            self.rate,
+            self.path.coordinates,
+            wheel_momentum(self.path),
+            self.path.duration,
+        )
 
     @cached_property
     def typical_force(self) -> float:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.checks.evidence import Evidence
-from dmoc.motion.configuration import places_in, speeds_in
+from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.flown import BREAKS
 from dmoc.motion.momenta import rates_along
@@ -74,17 +74,18 @@ def _boundary(evidence: Evidence) -> Iterable[Excess]:
     problem, path, body = evidence.problem, evidence.path, evidence.dynamics.configuration
     t, q, _, m = state_symbols(body.size)
     v = ca.SX.sym("v", body.freedom)
-    places, speeds = places_in(body.blocks), speeds_in(body.blocks)
+    made = body.coordinates
     sizes = {"m": evidence.extent, "m/s": evidence.speed, "rad/s": evidence.rate}
     for name, place, velocity in (("start", 0, path.start_velocity), ("goal", -1, path.goal_velocity)):
         end = getattr(problem, name)
         position = evidence.position[place] - end.fixed()[0]
         slip = velocity - end.fixed()[1]
         for kind, off, allowed, unit in (
-            ("position", position[places], FIXED * evidence.extent + evidence.rounding, "m"),
-            ("velocity", slip[speeds], FIXED * evidence.speed, "m/s"),
-            ("attitude", position[~places], FIXED, "-"),
-            ("rate", slip[~speeds], FIXED * evidence.rate, "rad/s"),
+            ("position", position[made.places], FIXED * evidence.extent + evidence.rounding, "m"),
+            ("velocity", slip[made.speeds], FIXED * evidence.speed, "m/s"),
+            ("attitude", position[made.kinds == ATTITUDE], FIXED, "-"),
+            ("rate", slip[made.rates], FIXED * evidence.rate, "rad/s"),
+            ("wheel momentum", slip[made.spins], FIXED * evidence.scales.momentum, "N m s"),
         ):
             if off.size:
                 yield Excess(f"{name} {kind}", _most(np.abs(off)[~np.isnan(off)]), allowed, unit)
@@ -110,7 +111,7 @@ def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     for cut in cuts(evidence.problem.constraints, evidence.path, evidence.node_velocity, *scales):
         yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
     if evidence.path.attitudes:
-        rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)[:, ~evidence.speeds]
+        rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)[:, evidence.rates]
         for cut in turn_cuts(evidence.problem.constraints, evidence.path, evidence.begin, rates):
             yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
 

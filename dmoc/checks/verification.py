@@ -170,7 +170,7 @@ def _rollout(evidence: Evidence) -> Check:
     """March the scheme from the start; errors that the motion itself amplifies are allowed for in the limit."""
     begin = evidence.boundary_momentum(0)
     q, p = rollout(evidence.dynamics, evidence.path, evidence.begin, evidence.position[0], begin)
-    miss = apart(evidence.path.parts, q, evidence.position[evidence.ends])
+    miss = apart(evidence.path.coordinates, q, evidence.position[evidence.ends])
     slip, scales = p - evidence.momentum, evidence.scales
     sizes = np.concatenate([scales.positions, np.where(evidence.speeds, evidence.speed, evidence.spin)])
     off = np.abs(np.concatenate([miss, slip], axis=1)).max(axis=0)
@@ -190,8 +190,8 @@ def _misses(evidence: Evidence, off: np.ndarray) -> str:
     speeds, parts = evidence.speeds, []
     if speeds.any():
         parts += [f"{moved[speeds].max():.2g} m", f"{slipped[speeds].max():.2g} m/s"]
-    if not speeds.all():
-        parts.append(f"{np.degrees(np.linalg.norm(moved[~speeds])):.2g} degrees")
+    if evidence.rates.any():
+        parts.append(f"{np.degrees(np.linalg.norm(moved[evidence.rates])):.2g} degrees")
     return ", ".join(parts)
 
 
@@ -213,12 +213,12 @@ def _amplification(matrices: np.ndarray) -> float:
 def _reference(evidence: Evidence) -> Check:
     """The equations of motion, integrated without the scheme, meet the goal."""
     miss, slip = goal_miss(evidence.dynamics, evidence.path, evidence.begin)
-    speeds, told = evidence.speeds, []
+    speeds, rates, told = evidence.speeds, evidence.rates, []
     if speeds.any():
         told += [f"{np.linalg.norm(miss[speeds]):.2g} m", f"{np.linalg.norm(slip[speeds]):.2g} m/s"]
-    if not speeds.all():
-        turned = np.degrees(np.linalg.norm(miss[~speeds]))
-        told += [f"{turned:.2g} degrees", f"{np.linalg.norm(slip[~speeds]):.2g} rad/s"]
+    if rates.any():
+        turned = np.degrees(np.linalg.norm(miss[rates]))
+        told += [f"{turned:.2g} degrees", f"{np.linalg.norm(slip[rates]):.2g} rad/s"]
     note = f"misses the goal by {', '.join(told[:-1])} and {told[-1]}"
     return Check.of("reference", evidence.scales.share(miss, slip), _accuracy(evidence), "of the path", note)
 

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 
 from dmoc.effects.base import Effect
-from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import velocity_along
@@ -86,7 +85,7 @@ def _undefined_effect(dynamics: Dynamics, problem: TransferProblem, state: tuple
 def _arguments(dynamics: Dynamics, effect: Effect, state: list[np.ndarray]) -> str:
     """The arguments that an effect depends on, in words; the distance to its centre alone where that is 0."""
     body = dynamics.configuration
-    position = state[1][places_in(body.blocks)]
+    position = state[1][body.coordinates.places]
     center = getattr(effect, "center", None)
     offset = position - (
         np.zeros(len(position)) if center is None else np.asarray(center, float)[: len(position)]
@@ -138,7 +137,7 @@ def _row(
     if group.owner is None and group.kind == "smooth":
         # A row of motion is a momentum per mass; over the node's share of the time it is a force.
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
-        unit = "N" if places_in(nlp.dynamics.configuration.blocks)[component] else "N m"
+        unit = "N" if nlp.dynamics.configuration.coordinates.places[component] else "N m"
         return value * problem.mass / weight, unit
     unit = group.units[component]
     if group.owner is None or group.owner.field in ("start", "goal"):
@@ -147,10 +146,10 @@ def _row(
 
 
 def _unit_of_unknown(nlp: NLP, problem: TransferProblem, group: Group, component: int) -> str:
-    blocks = nlp.dynamics.configuration.blocks
+    blocks = nlp.dynamics.configuration.coordinates
     if group.name == "position":
-        return "m" if places_in(blocks)[component] else "-"
+        return str(blocks.sized("m", "-", "N m s^2")[component])
     if group.name.endswith(".velocity"):
-        return "m/s" if speeds_in(blocks)[component] else "rad/s"
+        return str(blocks.paced("m/s", "rad/s", "N m s")[component])
     units = {"mass": "kg", "duration": "s", "reaction": "m^2/s^2"}
     return units.get(group.name) or problem.actuator.units(problem.dimension)[component]

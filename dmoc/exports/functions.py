@@ -15,8 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Part, Term, named, number_terms
-from dmoc.motion.configuration import QUATERNION
+from dmoc.exports.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
@@ -50,8 +49,8 @@ class Scene:
     @cached_property
     def parts(self) -> dict[Part, tuple[int, int]]:
         """The parts of the body, and how many coordinates and velocities each has."""
-        blocks = self.dynamics.configuration.blocks
-        return {ATTITUDE if size == QUATERNION else PLACE: (size, min(size, 3)) for size in blocks}
+        blocks = self.dynamics.configuration.coordinates.blocks
+        return {PARTS[block.kind]: (block.size, block.freedom) for block in blocks}
 
     def names(self, kind: str, prefix: str = "") -> dict[str, int]:
         """What the parts of a column are called that is of one kind, a field of `Part`, and their sizes."""

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from dmoc.configurations import coordinates
+
 
 @dataclass(frozen=True)
 class Term:
@@ -45,6 +47,16 @@ class Part(NamedTuple):
 
 PLACE = Part("position", "positions", "velocity", "velocities", "residual", "dynamics")
 ATTITUDE = Part("attitude", "attitudes", "rate", "rates", "residual_torque", "dynamics_attitude")
+WHEELS = Part(
+    "wheel_integral",
+    "wheel_integrals",
+    "wheel_momentum",
+    "wheel_momenta",
+    "residual_wheels",
+    "dynamics_wheels",
+)
+# The part of each kind of block of coordinates.
+PARTS = {coordinates.PLACE: PLACE, coordinates.ATTITUDE: ATTITUDE, coordinates.WHEELS: WHEELS}
 
 # Unit and meaning of every argument that has one name in all functions.
 TERMS = {

@@ -17,7 +17,7 @@ from dmoc.basics.quaternions import (
     times,
     turned_by,
 )
-from dmoc.motion.configuration import configuration_of, quaternions_in
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
@@ -126,7 +126,7 @@ def checked_turning(
         ) from error
     if position.shape != (len(fractions), body.size) or not np.isfinite(position).all():
         raise ValueError(f"guess must give {body.size} finite coordinates, {names}; got {position.shape[-1]}")
-    for at in quaternions_in(body.blocks):
+    for at in body.coordinates.quaternions:
         position[:, at] = in_one_sign(normalised(position[:, at]))
         goal = problem.goal.fixed()[0][at]
         if float(position[-1, at] @ goal) < 0:
@@ -144,7 +144,7 @@ def turning_guess(
     (mesh, order, hold), (path_of_point, duration_of_point) = on, for_point
     body = configuration_of(problem)
     if isinstance(given, DiscretePath):
-        if tuple(given.parts) != tuple(body.blocks):
+        if given.coordinates != body.coordinates:
             raise ValueError(
                 f"guess has {given.position.shape[1]} coordinates but the problem has {body.size}: "
                 f"{', '.join(body.names)}"
@@ -172,4 +172,4 @@ def turning_guess(
     velocities = [np.where(np.isnan(fixed), guessed, fixed) for _, (_, fixed), guessed in ends]
     mass = np.full(len(position), problem.mass)
     on_mesh = mesh, order, hold, duration, position, control, mass
-    return DiscretePath(*on_mesh, velocities[0], velocities[1], blocks=body.blocks)
+    return DiscretePath(*on_mesh, velocities[0], velocities[1], made_of=body.coordinates)

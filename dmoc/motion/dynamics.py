@@ -9,8 +9,9 @@ from typing import Any
 import casadi as ca
 
 from dmoc.basics.memory import remembered_property
+from dmoc.configurations.base import Configuration
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.base import Effect
-from dmoc.motion.configuration import Configuration, configuration_of
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.forces import FreeForce
 

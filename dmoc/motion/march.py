@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
-from dmoc.motion.configuration import configuration_of, places_in, speeds_in
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
@@ -37,7 +37,10 @@ class Trajectory:
     attitude : array, shape (steps+1, 4), or None
         Unit quaternion of a rigid body, scalar first, from body to space.
     rate, spin : arrays, shape (steps+1, 3), or None
-        Angular rate [rad/s] and angular momentum per unit mass [m^2/s] of a rigid body, in body axes.
+        Angular rate [rad/s] and angular momentum per unit mass [m^2/s] of a rigid body, in body axes, the
+        momenta of its reaction wheels included.
+    wheel_momentum : array, shape (steps+1, wheels), or None
+        Angular momenta of reaction wheels about their axes [N m s].
     mass : array, shape (steps+1,)
         [kg].
     energy : array, shape (steps+1,)
@@ -53,6 +56,7 @@ class Trajectory:
     attitude: np.ndarray | None = None
     rate: np.ndarray | None = None
     spin: np.ndarray | None = None
+    wheel_momentum: np.ndarray | None = None
 
 
 def simulate(
@@ -112,12 +116,12 @@ def simulate(
     q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel(), compensated)
     v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
     energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
-    blocks = dynamics.configuration.blocks
-    places, speeds = places_in(blocks), speeds_in(blocks)
-    trajectory = Trajectory(time, q[:, places], v[:, speeds], p[:, speeds], mass, energy)
-    if places.all():
-        return trajectory
-    return replace(trajectory, attitude=q[:, ~places], rate=v[:, ~speeds], spin=p[:, ~speeds])
+    made = dynamics.configuration.coordinates
+    trajectory = Trajectory(time, q[:, made.places], v[:, made.speeds], p[:, made.speeds], mass, energy)
+    for at in made.quaternions:
+        turned = {"attitude": q[:, at], "rate": v[:, made.rates], "spin": p[:, made.rates]}
+        trajectory = replace(trajectory, **turned)
+    return replace(trajectory, wheel_momentum=v[:, made.spins]) if made.spins.any() else trajectory
 
 
 def _path_at_start(
@@ -143,8 +147,8 @@ def _path_at_start(
     position, velocity = problem.start.fixed()
     mass = np.full(nodes, problem.mass)
     still = np.tile(position, (nodes, 1))
-    blocks = configuration_of(problem).blocks
-    return DiscretePath(mesh, order, hold, longest, still, given, mass, velocity, velocity, blocks=blocks)
+    made = configuration_of(problem).coordinates
+    return DiscretePath(mesh, order, hold, longest, still, given, mass, velocity, velocity, made_of=made)
 
 
 def node_masses(dynamics: Dynamics, path: DiscretePath, mass: float) -> np.ndarray:

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics, actuation
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
@@ -52,7 +51,7 @@ def rates_along(dynamics: Dynamics, position: np.ndarray, slopes: np.ndarray) ->
         return slopes
     # Z' dq/dt is w of a place and w / 4 of a unit quaternion, since Z = L H / 2 there.
     along = along_path(dynamics, position, slopes)
-    return np.where(speeds_in(dynamics.configuration.blocks), along, 4 * along)
+    return along * dynamics.configuration.coordinates.paced(1.0, 4.0, 1.0)
 
 
 def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:

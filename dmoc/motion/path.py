@@ -9,14 +9,10 @@ import numpy as np
 
 from dmoc.basics.arguments import LARGEST, number
 from dmoc.basics.numerics import cubic_spline
-from dmoc.basics.quaternions import QUATERNION, angle_between, normalised, times
-from dmoc.motion.configuration import places_in, quaternions_in, speeds_in
+from dmoc.basics.quaternions import angle_between, normalised, times
+from dmoc.configurations.coordinates import ATTITUDE, Coordinates
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
-
-# A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
-# by the optimiser, and errors of that size are no errors of a turn.
-LEAST_TURN = 1e-4
 
 
 class Key(NamedTuple):
@@ -66,8 +62,8 @@ class DiscretePath:
         [m/s], and rates in body axes [rad/s].
     multipliers : dict
         Costates and bound multipliers by group, densities in time; empty for a plain guess.
-    blocks : tuple of int
-        Sizes of the parts of q in turn, 4 for a unit quaternion, as in `Configuration`; one place if empty.
+    made_of : Coordinates, optional
+        Of what parts q is made; of one place in space if not given.
     reaction : array, shape (nodes, entries), optional
         Forces of the constraint g(q) = 0 per unit mass; 0 if not given.
     """
@@ -82,29 +78,29 @@ class DiscretePath:
     start_velocity: np.ndarray
     goal_velocity: np.ndarray
     multipliers: dict[Key, np.ndarray] = field(default_factory=dict)
-    blocks: tuple[int, ...] = ()
+    made_of: Coordinates | None = None
     reaction: np.ndarray | None = None
 
     @property
-    def parts(self) -> tuple[int, ...]:
-        """The sizes of the parts of q."""
-        return self.blocks or self.position.shape[1:]
+    def coordinates(self) -> Coordinates:
+        """Of what parts q is made."""
+        return self.made_of or Coordinates.of_point(self.position.shape[1])
 
     @property
     def place(self) -> np.ndarray:
         """The coordinates that are places in space [m], shape (nodes, axes)."""
-        return self.position[:, places_in(self.parts)] if self.blocks else self.position
+        return self.position[:, self.made_of.places] if self.made_of else self.position
 
     def moved(self, bend: np.ndarray) -> DiscretePath:
         """The path with its places moved by a bend, shape (nodes, axes) [m]."""
         position = self.position.copy()
-        position[:, places_in(self.parts)] += bend
+        position[:, self.coordinates.places] += bend
         return replace(self, position=position)
 
     @property
     def attitudes(self) -> list[np.ndarray]:
         """The unit quaternions of each body that turns, shape (nodes, 4) each."""
-        return [self.position[:, at] for at in quaternions_in(self.parts)]
+        return [self.position[:, at] for at in self.coordinates.quaternions]
 
     @property
     def diagonal(self) -> float:
@@ -185,19 +181,17 @@ class DiscretePath:
 
     def _slope(self, place: int, velocity: np.ndarray) -> np.ndarray:
         """dq/dt at a node from the independent velocities there."""
-        slopes, taken = [], 0
-        for size, at in zip(self.parts, np.cumsum((0, *self.parts)), strict=False):
-            count = 3 if size == QUATERNION else size
-            here, taken = velocity[taken : taken + count], taken + count
-            if size == QUATERNION:
-                here = 0.5 * times(self.position[place, at : at + size], np.append(0.0, here))
-            slopes.append(here)
+        made, moving = self.coordinates, self.coordinates.parted(velocity)
+        slopes = [
+            0.5 * times(at, np.append(0.0, rate)) if kind == ATTITUDE else rate
+            for (kind, _), at, rate in zip(made.blocks, made.cut(self.position[place]), moving, strict=True)
+        ]
         return np.concatenate(slopes)
 
     def _interpolated(self, old: np.ndarray, new: np.ndarray, ends: tuple) -> np.ndarray:
         """Positions at other fractions; attitudes stay unit quaternions."""
         position = cubic_spline(old, self.position, ends)(new)
-        for at in quaternions_in(self.parts):
+        for at in self.coordinates.quaternions:
             position[:, at] = normalised(position[:, at])
         return position
 
@@ -248,52 +242,3 @@ def _points_within(key: Key, rule: Scheme) -> tuple[np.ndarray, np.ndarray]:
 def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray:
     """Linear interpolation of every column: never beyond the values it is made from."""
     return np.stack([np.interp(new, old, column) for column in values.T], axis=1) if values.size else values
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Sizes for errors of a path: [m] and [m/s] of places, [rad] and [rad/s] of attitudes."""
-
-    extent: float
-    speed: float
-    turn: float
-    rate: float
-    blocks: tuple[int, ...]
-
-    @property
-    def positions(self) -> np.ndarray:
-        """One for each way the body can move: entries of a place, small turns of an attitude."""
-        return np.where(speeds_in(self.blocks), self.extent, self.turn)
-
-    @property
-    def velocities(self) -> np.ndarray:
-        """One for each independent velocity."""
-        return np.where(speeds_in(self.blocks), self.speed, self.rate)
-
-    @property
-    def coordinates(self) -> np.ndarray:
-        """One for each coordinate; a small turn moves a quaternion by half of it."""
-        return np.where(places_in(self.blocks), self.extent, 0.5 * self.turn)
-
-    def share(self, moved: np.ndarray, slipped: np.ndarray) -> float:
-        """The largest of errors of position and velocity over their sizes, block by block [-]."""
-        ends = np.cumsum([3 if size == QUATERNION else size for size in self.blocks])[:-1]
-        parts = [*np.split(moved / self.positions, ends), *np.split(slipped / self.velocities, ends)]
-        return float(max(np.linalg.norm(part) for part in parts))
-
-
-def path_scales(path: DiscretePath) -> Scales:
-    """Extent of the path and its mean speed or that of its ends if that is more; the same for its turn."""
-    extent = path.diagonal
-    speeds = speeds_in(path.parts)
-    both = np.array([path.start_velocity, path.goal_velocity])
-    ends = float(np.linalg.norm(both[:, speeds], axis=1).max())
-    # A body that ends where it began along a line of no extent is measured by what its speed would cover.
-    extent = extent or ends * path.duration or 1.0
-    length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
-    speed = max(length / path.duration, ends) or extent / path.duration
-    spins = float(np.linalg.norm(both[:, ~speeds], axis=1).max())
-    turn = max(path.turn, LEAST_TURN) if path.attitudes else 1.0
-    turned = sum(float(angle_between(q[1:], q[:-1]).sum()) for q in path.attitudes)
-    rate = max(turned / path.duration, spins) or turn / path.duration
-    return Scales(extent, speed, turn, rate, tuple(path.parts))

@@ -10,13 +10,14 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.basics.quaternions import QUATERNION, conjugate, rotation_vectors
+from dmoc.basics.quaternions import conjugate, rotation_vectors
 from dmoc.basics.quaternions import times as multiplied
-from dmoc.motion.configuration import places_in
+from dmoc.configurations.coordinates import ATTITUDE, Coordinates
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.scales import path_scales
 from dmoc.motion.step import weighted
 
 # The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
@@ -35,17 +36,16 @@ def goal_miss(dynamics: Dynamics, path: DiscretePath, start_time: float) -> tupl
     # A motion that cannot be integrated gives NaN, which no limit lets pass.
     with np.errstate(invalid="ignore"):
         q, v = reference(dynamics, path, start_time, path.start_velocity)
-        return apart(path.parts, q, path.position[-1]), v - path.goal_velocity
+        return apart(path.coordinates, q, path.position[-1]), v - path.goal_velocity
 
 
-def apart(blocks: tuple[int, ...], one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def apart(made_of: Coordinates, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """The differences of coordinates, of attitudes as rotation vectors [rad]; of shape (..., freedom)."""
-    ends = np.cumsum(blocks)[:-1]
-    pairs = zip(np.split(one, ends, axis=-1), np.split(other, ends, axis=-1), strict=True)
+    parts = zip(made_of.blocks, made_of.cut(one), made_of.cut(other), strict=True)
     return np.concatenate(
         [
-            rotation_vectors(multiplied(conjugate(b), a)) if a.shape[-1] == QUATERNION else a - b
-            for a, b in pairs
+            rotation_vectors(multiplied(conjugate(b), a)) if kind == ATTITUDE else a - b
+            for (kind, _), a, b in parts
         ],
         axis=-1,
     )
@@ -112,7 +112,7 @@ def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -
     n, duration = path.position.shape[1], path.duration
     if path.attitudes:
         scales = path_scales(path)
-        units = np.where(places_in(path.parts), scales.extent, 1.0)
+        units = path.coordinates.sized(scales.extent, 1.0, scales.momentum * path.duration)
         return 1e-12 * np.concatenate([units, scales.velocities, path.mass[:1]])
     thrust = np.abs(control).max(initial=0.0) / path.mass.min()
     # A body held in place has no extent: a thousandth of where the thrust alone would take it stands in.

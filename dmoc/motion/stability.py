@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmoc.basics.quaternions import angle_between
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import step_matrices
@@ -96,7 +95,7 @@ def flow_matrices(
 def steps_to_turn(path: DiscretePath) -> int:
     """So many equal steps follow the turns of a path: none turns a body by more than its order allows."""
     h = path.duration * np.diff(path.mesh)
-    spins = np.array([path.start_velocity, path.goal_velocity])[:, ~speeds_in(path.parts)]
+    spins = np.array([path.start_velocity, path.goal_velocity])[:, path.coordinates.rates]
     most = np.zeros(len(h))
     for q in path.attitudes:
         turned = angle_between(q[1:], q[:-1]).reshape(len(h), -1).sum(axis=1)

@@ -31,7 +31,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.configuration import Configuration, places_in
+from dmoc.configurations.base import Configuration
 from dmoc.motion.dynamics import Dynamics, actuation, kinetic_at_nodes
 from dmoc.motion.lobatto import Scheme
 
@@ -87,7 +87,7 @@ def step_momenta(
     inertia = scheme.derivative.T * scheme.weights @ scheme.derivative
     moves = [position - q[0] for position in q[1:]]
     if body is not None and body.surplus:
-        places = ca.DM(places_in(body.blocks).astype(float))
+        places = ca.DM(body.coordinates.places.astype(float))
         v, moves = [velocity * places for velocity in v], [move * places for move in moves]
     added = [dldv - velocity for (_, dldv, _), velocity in zip(at, v, strict=True)]
     return [
@@ -171,7 +171,7 @@ def _first_guess(dynamics: Dynamics, scheme: Scheme, h: Any, state: tuple) -> tu
     if not dynamics.configuration.surplus:
         speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
         return ca.vertcat(*[c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]), speed
-    places = places_in(dynamics.configuration.blocks)
+    places = dynamics.configuration.coordinates.places
     along = velocity * ca.DM(places.astype(float))
     linear = ca.sqrt(ca.dot(along, along) + 1e-300)
     # A body that turns by more than a radian a step leaves the scheme, so a quaternion changes by less than 1.

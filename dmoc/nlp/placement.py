@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from dmoc.guess.chart import Chart
-from dmoc.motion.configuration import places_in, speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
@@ -43,7 +42,7 @@ class Placement:
         # A row of motion is a momentum per unit mass [m/s], of an attitude [m^2/s]; as an impulse over force or
         # torque times time it is near 1.
         body = self.dynamics.configuration
-        unit = np.where(places_in(body.blocks), units.force, units.torque)
+        unit = body.coordinates.sized(units.force, units.torque, units.torque)
         impulse = (problem.mass / (unit * units.time))[None]
         axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
@@ -63,8 +62,9 @@ class Placement:
     def _columns(self) -> Layout:
         problem, units, nodes = self.problem, self.units, self.counts["node"]
         body, actuator, n = self.dynamics.configuration, problem.actuator, problem.dimension
-        lengths = np.where(places_in(body.blocks), units.length, 1.0)[None]
-        speeds = np.where(speeds_in(body.blocks), units.length / units.time, 1 / units.time)[None]
+        lengths = body.coordinates.sized(units.length, 1.0, units.torque * units.time**2)[None]
+        paces = units.length / units.time, 1 / units.time, units.torque * units.time
+        speeds = body.coordinates.paced(*paces)[None]
         columns = Layout().add("position", "node", body.names, nodes, lengths)
         sizes = np.array([[units.torque if unit == "N m" else units.force for unit in actuator.units(n)]])
         controls = self.steps if self.hold else nodes

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.configurations.coordinates import Coordinates
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
-from dmoc.motion.configuration import configuration_of, places_in, quaternions_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
@@ -78,7 +79,7 @@ class Program:
             lower[group.start : group.stop] = np.broadcast_to(low, (group.count, len(group.labels))).ravel()
             upper[group.start : group.stop] = np.broadcast_to(high, (group.count, len(group.labels))).ravel()
 
-        n, origin, places = problem.dimension, self.units.origin, places_in(self.dynamics.configuration.blocks)
+        n, origin, places = problem.dimension, self.units.origin, self.dynamics.configuration.coordinates.places
         boxes = [constraint.bounds(n) for constraint in problem.constraints]
         sides = []
         for found, free in zip(_intersection(boxes, n), (-np.inf, np.inf), strict=True):
@@ -157,15 +158,15 @@ class Program:
             get["mass"][:, 0] if "mass" in get else np.full(nodes, problem.mass),
             get["start.velocity"][0],
             get["goal.velocity"][0],
-            blocks=self.blocks,
+            made_of=self.made_of,
             reaction=get.get("reaction"),
         )
 
     @property
-    def blocks(self) -> tuple[int, ...]:
-        """Sizes of the parts of q, where there is more than one place."""
+    def made_of(self) -> Coordinates | None:
+        """Of what parts q is made, where there is more than one place."""
         body = self.dynamics.configuration
-        return body.blocks if body.surplus else ()
+        return body.coordinates if body.surplus else None
 
     def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
@@ -235,7 +236,7 @@ def _equal(new: Any, old: Any) -> bool:
 
 def _open(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
     """Which entries of the constraint g look at an entry of a boundary position that is free (NaN)."""
-    return np.array([np.isnan(position[at]).any() for at in quaternions_in(dynamics.configuration.blocks)])
+    return np.array([np.isnan(position[at]).any() for at in dynamics.configuration.coordinates.quaternions])
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:

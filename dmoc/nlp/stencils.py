@@ -16,8 +16,8 @@ from typing import Any
 import casadi as ca
 
 from dmoc.basics.memory import remembered
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import drafted
-from dmoc.motion.configuration import configuration_of
 from dmoc.motion.dynamics import Dynamics, actuation, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmoc.motion.configuration import places_in, speeds_in
-from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.scales import path_scales
 from dmoc.results.flown_cost import cost_functions
 from dmoc.scene.problem import TransferProblem
 
@@ -50,7 +50,7 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     or with the unit of force all the way if that is more.
     """
     low, high = guess.position.min(axis=0), guess.position.max(axis=0)
-    places, speeds = places_in(guess.parts), speeds_in(guess.parts)
+    places, speeds = guess.coordinates.places, guess.coordinates.speeds
     # Attitudes count from zero: their quaternions are of size 1 anyway.
     origin = np.where(places, 0.5 * (low + high), 0.0)
     time = guess.duration
@@ -113,6 +113,6 @@ def cost_along(problem: TransferProblem, guess: DiscretePath, instead: np.ndarra
     control = control[np.minimum(nodes, len(guess.mesh) - 2) if guess.hold else some]
     control = control if instead is None else np.broadcast_to(instead, control.shape)
     rates = rate(times[None], guess.place[some].T, velocity.T, control.T, guess.mass[some][None])
-    last = guess.goal_velocity[speeds_in(guess.parts)]
+    last = guess.goal_velocity[guess.coordinates.speeds]
     end = terminal(times[-1], guess.place[-1], last, guess.mass[-1])
     return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)

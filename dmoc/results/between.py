@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmoc.basics.quaternions import QUATERNION, normalised
-from dmoc.motion.configuration import places_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
@@ -83,7 +82,7 @@ def cuts(
     """
     if not constraints or not path.place.size:
         return
-    velocity = velocity[:, places_in(path.parts)]
+    velocity = velocity[:, path.coordinates.places]
     longest = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).max())
     inside, chord, moving, straight = _inside_gaps(constraints, path, velocity, longest)
     parts = (len(inside) - 1) // (len(path.position) - 1)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import wrench_of
 from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
-from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, path_scales
+from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath
 from dmoc.motion.reference import goal_miss
+from dmoc.motion.scales import path_scales
 from dmoc.motion.step import step_map
 from dmoc.results.facts import Error
 from dmoc.results.flown_cost import TINY, unpriced
@@ -124,6 +124,6 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
         now = now + np.array(np.vstack([np.array(moves[0]), np.array(moves[1])])).T
     # The spin of a body is judged by its largest along the path.
     spin = np.abs(momentum).max() or 1.0
-    momenta = np.where(speeds_in(path.parts), scales.speed, spin)
+    momenta = np.where(path.coordinates.speeds, scales.speed, spin)
     gap = np.abs(states[1:] - now) / np.concatenate([scales.coordinates, momenta])
     return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.configuration import configuration_of, places_in
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
@@ -72,7 +72,7 @@ def cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
 
 
 def _written(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
-    t, q, v, m = state_symbols(int(places_in(configuration_of(problem).blocks).sum()))
+    t, q, v, m = state_symbols(int(configuration_of(problem).coordinates.places.sum()))
     u = ca.SX.sym("u", problem.controls)
     rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
     terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])

@@ -127,3 +127,16 @@ def _refuse_other_formats(file: Path, facts: dict[str, Any], form: Format) -> No
             f"{file} comes from a newer dmoc (format {version}, this one reads up to {form.version}); "
             "update dmoc"
         )
+
+
+def as_array(table: Table, name: str) -> np.ndarray:
+    """The numbers of a variable.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name not in table:
+        raise ValueError(f"it lacks the variable {name!r}")
+    return np.array(table[name][1], float)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.path import COSTATE, DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.table import read, write
@@ -45,7 +44,11 @@ class Solution:
         Multipliers of the discrete Euler-Lagrange equations [unit of the objective per m/s].
     rate, spin, torque : arrays, shape (steps+1 or nodes, 3), or None
         Of a rigid body, in body axes: angular rate [rad/s] and angular momentum per unit mass [m^2/s] at the
-        step ends, and torque of the actuator about the centre of mass [N m] where `force` is given.
+        step ends, and torque of the actuator about the centre of mass [N m] where `force` is given. The
+        angular momentum counts that of reaction wheels; what they do is no torque from outside.
+    wheel_momentum, wheel_torque : arrays, shape (steps+1 or nodes, wheels), or None
+        Angular momenta of reaction wheels about their axes [N m s], and the torques of their motors on them
+        [N m].
     attitude : array, shape (nodes, 4), or None
         Of a rigid body: unit quaternion from body to space, scalar first.
     success : bool
@@ -82,6 +85,8 @@ class Solution:
     rate: np.ndarray | None = None
     spin: np.ndarray | None = None
     torque: np.ndarray | None = None
+    wheel_momentum: np.ndarray | None = None
+    wheel_torque: np.ndarray | None = None
     provenance: Provenance = field(kw_only=True)
 
     @property
@@ -232,13 +237,15 @@ class Solution:
 
 def reported(path: DiscretePath, velocity: np.ndarray, momentum: np.ndarray, force: np.ndarray) -> dict:
     """The fields of a solution for independent velocities, momenta and what the actuator does, one row each."""
-    speeds = speeds_in(path.parts)
+    made = path.coordinates
     places = {"velocity": velocity, "momentum": momentum, "force": force}
-    found = {name: values[:, speeds] for name, values in places.items()}
-    if speeds.all():
-        return found
-    turns = {"rate": velocity, "spin": momentum, "torque": force}
-    return found | {name: values[:, ~speeds] for name, values in turns.items()}
+    found = {name: values[:, made.speeds] for name, values in places.items()}
+    if made.turns:
+        turns = {"rate": velocity, "spin": momentum, "torque": force}
+        found |= {name: values[:, made.rates] for name, values in turns.items()}
+    if made.spins.any():
+        found |= {"wheel_momentum": velocity[:, made.spins], "wheel_torque": force[:, made.spins]}
+    return found
 
 
 def load(path: str | os.PathLike) -> Solution:

@@ -8,7 +8,8 @@ import numpy as np
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
-from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key, path_scales
+from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
+from dmoc.motion.scales import path_scales
 from dmoc.scene.problem import TransferProblem
 
 # A control is at a limit if it is within this part of its span from it [-]. If more than the same part of all

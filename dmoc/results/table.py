@@ -22,12 +22,11 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.files import AGAIN
-from dmoc.basics.quaternions import QUATERNION
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.netcdf import Format, Table, one_line, read_table, write_table
+from dmoc.results.netcdf import Format, Table, as_array, one_line, read_table, write_table
+from dmoc.results.turning import turning_fields, turning_path, turning_shapes, turning_variables
 
 # The name and version by which a file of this kind is known, its description, and the remedy where it is none.
 SOLUTION_FILE = Format(
@@ -77,7 +76,7 @@ def to_dataset(solution: Any) -> Any:
 def _variables(solution: Any) -> Table:
     path, about = solution.path, solution.provenance
     at = "step" if path.hold else "node"
-    between, speeds = ", held over each step" if path.hold else BETWEEN, speeds_in(path.parts)
+    between, speeds = ", held over each step" if path.hold else BETWEEN, path.coordinates.speeds
     control_unit = ", ".join(dict.fromkeys(about.control_units))
     table = {
         "time": (("node",), solution.time, "s", "time"),
@@ -92,21 +91,7 @@ def _variables(solution: Any) -> Table:
         "start_velocity": (("axis",), path.start_velocity[speeds], "m/s", "velocity at the start"),
         "goal_velocity": (("axis",), path.goal_velocity[speeds], "m/s", "velocity at the goal"),
     }
-    if path.attitudes:
-        table |= {
-            "attitude": (("node", "quaternion"), solution.attitude, "1", "unit quaternion, body to space"),
-            "rate": (("end", "body_axis"), solution.rate, "rad/s", "angular rate in body axes"),
-            "spin": (("end", "body_axis"), solution.spin, "m2/s", "angular momentum per unit mass, body axes"),
-            "torque": ((at, "body_axis"), solution.torque, "N m", f"torque in body axes{between}"),
-            "start_rate": (("body_axis",), path.start_velocity[~speeds], "rad/s", "rate at the start"),
-            "goal_rate": (("body_axis",), path.goal_velocity[~speeds], "rad/s", "rate at the goal"),
-            "reaction": (
-                ("node", "constraint"),
-                path.reaction,
-                "m2/s2",
-                "constraint force per unit mass",
-            ),
-        }
+    table |= turning_variables(solution, at, between)
     variables: Table = {
         name: (dims, values, {"units": unit, "long_name": words})
         for name, (dims, values, unit, words) in table.items()
@@ -116,19 +101,14 @@ def _variables(solution: Any) -> Table:
     return variables | _multipliers(solution) | coordinates
 
 
-def _turning(table: Table) -> dict[str, np.ndarray]:
-    """What a file holds of a body that turns."""
-    return {name: _array(table, name) for name in ("rate", "spin", "torque") if "attitude" in table}
-
-
 def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
     """The solution in a file's attributes and variables."""
     return make(
         None,
         _path(facts, table),
-        _array(table, "velocity"),
-        _array(table, "momentum"),
-        _array(table, "force"),
+        as_array(table, "velocity"),
+        as_array(table, "momentum"),
+        as_array(table, "force"),
         float(facts["objective"]),
         bool(facts["success"]),
         str(facts["status"]),
@@ -140,33 +120,27 @@ def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
         tolerance=json.loads(facts["tolerance"]),
         error=Error(**error) if (error := json.loads(facts["error"])) else None,
         reason=str(facts["reason"]),
-        **_turning(table),
+        **turning_fields(table),
         provenance=_provenance(facts, table),
     )
 
 
 def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
     groups = [name for name in table if name.startswith("multiplier_")]
-    names = ("position", "attitude"), ("start_velocity", "start_rate"), ("goal_velocity", "goal_rate")
-    turns = "attitude" in table
-    position, start, goal = (
-        np.concatenate([_array(table, name) for name in pair[: 1 + turns]], axis=-1) for pair in names
-    )
-    axes = _array(table, "position").shape[1]
-    blocks = () if not turns else (axes, QUATERNION) if axes else (QUATERNION,)
+    made, position, start, goal = turning_path(table)
     return DiscretePath(
-        _array(table, "mesh"),
+        as_array(table, "mesh"),
         int(facts["order"]),
         bool(facts["hold"]),
         float(facts["duration"]),
         position,
-        _array(table, "control"),
-        _array(table, "mass"),
+        as_array(table, "control"),
+        as_array(table, "mass"),
         start,
         goal,
-        {Key.parse(str(table[name][2]["key"])): _array(table, name) for name in groups},
-        blocks,
-        _array(table, "reaction") if turns else None,
+        {Key.parse(str(table[name][2]["key"])): as_array(table, name) for name in groups},
+        made,
+        as_array(table, "reaction") if made else None,
     )
 
 
@@ -183,12 +157,6 @@ def _provenance(facts: dict[str, Any], table: Table) -> Provenance:
         json.loads(facts["versions"]),
         str(facts["created"]),
     )
-
-
-def _array(table: Table, name: str) -> np.ndarray:
-    if name not in table:
-        raise ValueError(f"it lacks the variable {name!r}")
-    return np.array(table[name][1], float)
 
 
 def _attributes(solution: Any) -> dict[str, Any]:
@@ -284,14 +252,10 @@ def _check_shapes(solution: Any) -> Any:
         "force": (solution.force, (controls, axes)),
         "velocity": (solution.velocity, (solution.steps + 1, axes)),
         "momentum": (solution.momentum, (solution.steps + 1, axes)),
-        "start_velocity": (path.start_velocity, (len(speeds_in(path.parts)),)),
-        "goal_velocity": (path.goal_velocity, (len(speeds_in(path.parts)),)),
+        "start_velocity": (path.start_velocity, path.coordinates.speeds.shape),
+        "goal_velocity": (path.goal_velocity, path.coordinates.speeds.shape),
     }
-    if path.attitudes:
-        turning = {"rate": (solution.rate, solution.steps + 1), "spin": (solution.spin, solution.steps + 1)}
-        turning |= {"torque": (solution.torque, controls)}
-        shapes |= {name: (values, (count, 3)) for name, (values, count) in turning.items()}
-        shapes["attitude"] = (path.attitudes[0], (nodes, QUATERNION))
+    shapes |= turning_shapes(solution, nodes, controls)
     for name, (values, wanted) in shapes.items():
         if values.shape != wanted:
             raise ValueError(f"{name} has shape {values.shape} where {wanted} belongs")

@@ -9,11 +9,11 @@ import numpy as np
 
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.flown import flown
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
-from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import MISSED, goal_miss
+from dmoc.motion.scales import path_scales
 from dmoc.results.between import Cut, cuts
 from dmoc.results.flown_cost import unpriced
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
@@ -249,7 +249,7 @@ def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
 def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:
     """Velocities at the nodes [m/s], and the scales of a path, its extent [m] and its largest speed [m/s]."""
     _, ends = end_momenta(ladder.dynamics, path, ladder.problem.start_time)
-    extent, linear = path.diagonal or 1.0, ends[:, speeds_in(path.parts)]
+    extent, linear = path.diagonal or 1.0, ends[:, path.coordinates.speeds]
     speed = max(float(np.linalg.norm(linear, axis=1).max(initial=0.0)), extent / path.duration)
     return (
         node_velocities(path, velocity_along(ladder.dynamics, path.position[:: path.order // 2], ends)),

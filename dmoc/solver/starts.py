@@ -14,8 +14,8 @@ from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import angle_around, followed, starting_guess
-from dmoc.motion.configuration import places_in, quaternions_in
-from dmoc.motion.path import DiscretePath, path_scales
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.scales import path_scales
 from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
@@ -173,7 +173,7 @@ def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, 
         yield ways[1]
     draw = np.random.default_rng(0)
     number = 0
-    places = places_in(base.parts)
+    places = base.coordinates.places
     while True:
         number += 1
         name, path = ways[number % len(ways)]
@@ -181,7 +181,7 @@ def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, 
         position = path.position.copy()
         position[:, places] += waves @ draw.normal(size=(2, int(places.sum()))) * 0.25 * path.diagonal
         # Bends of a radian or so: a turn may go about another axis than the shortest one.
-        for at in quaternions_in(path.parts):
+        for at in path.coordinates.quaternions:
             position[:, at] = times(position[:, at], turned_by(waves @ draw.normal(size=(2, 3))))
         yield f"bend {number}" + (f" of {name}" if name else ""), replace(path, position=position)
 

@@ -18,9 +18,10 @@ from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.motion.path import DiscretePath, Scales, path_scales
+from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import apart
 from dmoc.motion.reference import reference as fly
+from dmoc.motion.scales import Scales, path_scales
 from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
@@ -292,4 +293,4 @@ def _miss(problem: TransferProblem, path: DiscretePath | None, scales: Scales) -
         return np.nan
     dynamics = Dynamics.of(problem)
     position, velocity = fly(dynamics, path, problem.start_time, path.start_velocity)
-    return scales.share(apart(path.parts, position, path.position[-1]), velocity - path.goal_velocity)
+    return scales.share(apart(path.coordinates, position, path.position[-1]), velocity - path.goal_velocity)

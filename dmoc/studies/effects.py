@@ -19,7 +19,6 @@ from dmoc.effects import (
     ThirdBody,
     circular_motion,
 )
-from dmoc.motion.configuration import speeds_in
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta
@@ -150,7 +149,8 @@ def _influence(
     ]
     more, less = (_instructions(each, path) for each in (scene, without))
     slow, fast = _seconds(path, scene, without)
-    moved, speeds = apart(path.parts, *ends), speeds_in(path.parts)
+    moved = apart(path.coordinates, *ends)
+    speeds, rates = path.coordinates.speeds, path.coordinates.rates
     pulls = _accelerations(problem, path, effect)
     return Influence(
         effect,
@@ -160,8 +160,8 @@ def _influence(
         float(np.linalg.norm(moved[speeds])),
         more - less,
         max(0.0, 1 - fast / slow),
-        _largest(pulls[:, ~speeds]),
-        float(np.degrees(np.linalg.norm(moved[~speeds]))),
+        _largest(pulls[:, rates]),
+        float(np.degrees(np.linalg.norm(moved[rates]))),
     )
 
 

@@ -29,7 +29,7 @@ from dmoc import (
     tabulated_motion,
 )
 from dmoc.checks.verification import verify
-from dmoc.motion.configuration import Translation
+from dmoc.configurations.base import Translation
 from dmoc.motion.dynamics import Dynamics, split_effects
 
 MU, RADIUS = 3.986004418e14, 6.378137e6

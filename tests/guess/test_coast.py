@@ -7,9 +7,9 @@ from scipy.integrate import DOP853, solve_ivp
 
 from dmoc import PointGravity, RotatingFrame, Spring, State, ThirdBody, TransferProblem
 from dmoc.basics.numerics import root
+from dmoc.configurations.base import Translation
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import Spiral
-from dmoc.motion.configuration import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import coefficients
 

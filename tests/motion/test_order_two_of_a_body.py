@@ -8,7 +8,7 @@ import pytest
 
 from dmoc import Attitude, BodyForce, Pose, Thrusters, Torque, TransferProblem, rotation, simulate
 from dmoc.basics.quaternions import rotated, turned_by
-from dmoc.motion.configuration import configuration_of
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.momenta import legendre_function
 from dmoc.nlp.stencils import stencils_of

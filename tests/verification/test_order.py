@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dmoc import Effort, LinearDrag, Objective, PointGravity, RotatingFrame, State, TransferProblem, solve
-from dmoc.motion.configuration import Translation
+from dmoc.configurations.base import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.step import step_map

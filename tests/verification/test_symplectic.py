@@ -16,7 +16,7 @@ from dmoc import (
     UniformGravity,
     three_body,
 )
-from dmoc.motion.configuration import Translation
+from dmoc.configurations.base import Translation
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.step import step_map

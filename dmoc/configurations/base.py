@@ -1,0 +1,160 @@
+"""The configuration of a body: its coordinates, the constraint between them, its kinetic energy.
+
+A configuration is q in R^size with a constraint g(q) = 0 of size - freedom entries. The columns of the
+tangent matrix Z(q), of shape (size, freedom), span the directions in which q may move: dg/dq Z = 0. Three
+sizes stay apart: positions (entries of q), freedom (velocities and momenta that are reported) and controls
+(entries of u, which the actuator counts).
+
+References
+----------
+S. Leyendecker, S. Ober-Bloebaum, J. E. Marsden, M. Ortiz, Discrete mechanics and optimal control
+for constrained systems, Optim. Control Appl. Meth. 31 (2010).
+Z. R. Manchester, M. A. Peck, Quaternion variational integrators for spacecraft dynamics, J. Guid.
+Control Dyn. 39 (2016).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from dmoc.configurations.coordinates import Coordinates
+from dmoc.effects.base import Body
+
+# Names of the axes of space.
+AXES = "xyz"
+
+
+class Configuration(ABC):
+    """The coordinates of a body, or of several.
+
+    A frozen dataclass that derives from this has these duties:
+
+    1. Name its coordinates and velocities and say of what parts they are made: `names`, `velocity_names`,
+       `coordinates`.
+    2. Give the kinetic energy per unit mass: `kinetic`. Its derivatives, `inertia`, are CasADi's gradients
+       unless they are overridden by shorter expressions.
+    3. Where there are more coordinates than freedom: the constraint `g`, its slope `pull`, the tangent matrix
+       `tangent` and, for order 2, `step_inertia`.
+    4. Say what an effect sees of it, `body`, and how a force and a torque act on it, `generalised`.
+
+    Not its business: effects, actuators, meshes and units.
+    """
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """A name for each coordinate, used for rows and in result files."""
+
+    @property
+    def velocity_names(self) -> tuple[str, ...]:
+        """A name for each independent velocity."""
+        return self.names
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Of what parts q and the independent velocities are made."""
+        return Coordinates.of_point(self.size)
+
+    @property
+    @abstractmethod
+    def dimension(self) -> int:
+        """Number of axes of the space in which forces act."""
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.names)
+
+    @property
+    def freedom(self) -> int:
+        """Number of independent velocities, and of momenta."""
+        return len(self.velocity_names)
+
+    @property
+    def surplus(self) -> int:
+        """Number of entries of the constraint g."""
+        return self.size - self.freedom
+
+    @abstractmethod
+    def kinetic(self, q: Any, v: Any, m: Any) -> Any:
+        """Kinetic energy per unit mass [J/kg]."""
+
+    def inertia(self, q: Any, v: Any, m: Any) -> tuple[Any, Any]:
+        """Derivatives of the kinetic energy in q [m/s^2] and in v [m/s]."""
+        energy = self.kinetic(q, v, m)
+        return ca.gradient(energy, q), ca.gradient(energy, v)
+
+    def step_inertia(self, h: Any, q: Sequence, move: Any, m: Any) -> list:
+        """Derivatives of the kinetic energy of a step of order 2 in its two nodes q, per unit mass [m/s].
+
+        `move` is the second less the first. Asked for where there are more coordinates than freedom; a
+        configuration whose rate is the same at both nodes has shorter expressions.
+        """
+        (moved, first), (later, last) = (self.inertia(node, move / h, m) for node in q)
+        mean = 0.5 * (first + last)
+        return [0.5 * h * moved - mean, 0.5 * h * later + mean]
+
+    def g(self, q: Any) -> Any:
+        """The constraint g(q) = 0; no entries where the coordinates are free."""
+        return ca.SX.zeros(0)
+
+    def pull(self, q: Any, reaction: Any) -> Any:
+        """(dg/dq)' times the constraint forces `reaction`."""
+        return ca.jtimes(self.g(q), q, reaction, True)
+
+    def tangent(self, q: Any) -> Any:
+        """Z(q), shape (size, freedom)."""
+        return ca.DM.eye(self.size)
+
+    def along(self, q: Any, column: Any) -> Any:
+        """Z(q)' times a column of the size of q; the column itself where Z is the identity."""
+        return self.tangent(q).T @ column if self.surplus else column
+
+    def velocity(self, q: Any, w: Any) -> Any:
+        """dq/dt = Z(q) w; w itself where Z is the identity."""
+        return self.tangent(q) @ w if self.surplus else w
+
+    @abstractmethod
+    def body(self, q: Any, v: Any) -> Body:
+        """The body as effects see it."""
+
+    @abstractmethod
+    def generalised(self, q: Any, force: Any, torque: Any) -> Any:
+        """The column of the size of q by which a force [N] and a torque in body axes [N m] act; None is 0."""
+
+    def rotation(self, q: Any) -> Any:
+        """R(q), which turns body axes into space axes; None for a body without an attitude."""
+        return None
+
+
+@dataclass(frozen=True)
+class Translation(Configuration):
+    """A point mass in a space of 1 to 3 `axes`: q is its position, g has no entries, Z is the identity."""
+
+    axes: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(AXES[: self.axes])
+
+    @property
+    def dimension(self) -> int:
+        return self.axes
+
+    def kinetic(self, q: Any, v: Any, m: Any) -> Any:
+        return 0.5 * ca.dot(v, v)
+
+    def inertia(self, q: Any, v: Any, m: Any) -> tuple[Any, Any]:
+        # The gradient of v . v / 2 would be written with a multiplication for each axis.
+        return 0, v
+
+    def body(self, q: Any, v: Any) -> Body:
+        return Body(q, v)
+
+    def generalised(self, q: Any, force: Any, torque: Any) -> Any:
+        return force

@@ -1,0 +1,116 @@
+"""Of what parts the coordinates q and the independent velocities of a configuration are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from dmoc.basics.quaternions import AXES, QUATERNION
+
+# A place in space: 1 to 3 entries [m] that move at as many speeds [m/s].
+PLACE = "place"
+# A unit quaternion: 4 entries [-] that turn at a rate of 3 entries [rad/s].
+ATTITUDE = "attitude"
+# Reaction wheels: the time integrals [N m s^2] of their angular momenta [N m s].
+WHEELS = "wheels"
+
+
+class Block(NamedTuple):
+    """A part of q: its kind and how many entries it has."""
+
+    kind: str
+    size: int
+
+    @property
+    def freedom(self) -> int:
+        """Number of independent velocities."""
+        return AXES if self.kind == ATTITUDE else self.size
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The blocks of q in turn. Masks have one entry a coordinate or, where they say so, a velocity."""
+
+    blocks: tuple[Block, ...]
+
+    @classmethod
+    def of_point(cls, axes: int) -> Coordinates:
+        """Those of a point mass in a space of so many axes."""
+        return cls((Block(PLACE, axes),))
+
+    @classmethod
+    def of_body(cls, axes: int, wheels: int = 0) -> Coordinates:
+        """Those of a rigid body: place (if there are axes), wheels (if there are some), attitude."""
+        blocks = Block(PLACE, axes), Block(WHEELS, wheels), Block(ATTITUDE, QUATERNION)
+        return cls(tuple(block for block in blocks if block.size))
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """The kind of each coordinate."""
+        return np.repeat([block.kind for block in self.blocks], [block.size for block in self.blocks])
+
+    @cached_property
+    def motions(self) -> np.ndarray:
+        """The kind of each independent velocity."""
+        return np.repeat([block.kind for block in self.blocks], [block.freedom for block in self.blocks])
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Which coordinates are places in space [m]."""
+        return self.kinds == PLACE
+
+    @cached_property
+    def speeds(self) -> np.ndarray:
+        """Which independent velocities are speeds [m/s]."""
+        return self.motions == PLACE
+
+    @cached_property
+    def rates(self) -> np.ndarray:
+        """Which independent velocities are rates of turn [rad/s]."""
+        return self.motions == ATTITUDE
+
+    @cached_property
+    def spins(self) -> np.ndarray:
+        """Which independent velocities are angular momenta of wheels [N m s]."""
+        return self.motions == WHEELS
+
+    @cached_property
+    def quaternions(self) -> list[slice]:
+        """Where the unit quaternions stand among the coordinates."""
+        return [at for block, at in zip(self.blocks, self._slices(), strict=True) if block.kind == ATTITUDE]
+
+    @property
+    def turns(self) -> bool:
+        """Whether there is an attitude among them."""
+        return bool(self.quaternions)
+
+    def sized(self, of_place: object, of_attitude: object, of_wheels: object) -> np.ndarray:
+        """One number for each coordinate, by its kind."""
+        return _by_kind(self.kinds, of_place, of_attitude, of_wheels)
+
+    def paced(self, of_speed: object, of_rate: object, of_spin: object) -> np.ndarray:
+        """One number or word for each independent velocity, by its kind."""
+        return _by_kind(self.motions, of_speed, of_rate, of_spin)
+
+    def parted(self, values: np.ndarray) -> list[np.ndarray]:
+        """An array whose last axis has an entry a velocity, cut into those of the blocks."""
+        ends = np.cumsum([block.freedom for block in self.blocks])[:-1]
+        return np.split(values, ends, axis=-1)
+
+    def cut(self, values: np.ndarray) -> list[np.ndarray]:
+        """An array whose last axis has an entry a coordinate, cut into those of the blocks."""
+        return [values[..., at] for at in self._slices()]
+
+    def _slices(self) -> list[slice]:
+        ends = np.cumsum([0, *[block.size for block in self.blocks]])
+        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
+
+
+def _by_kind(kinds: np.ndarray, *values: object) -> np.ndarray:
+    named: Sequence = [kinds == name for name in (PLACE, ATTITUDE, WHEELS)]
+    return np.select(named, [np.asarray(value) for value in values])

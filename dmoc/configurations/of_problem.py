@@ -1,0 +1,16 @@
+"""Which configuration the body of a transfer problem has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dmoc.configurations.base import Configuration, Translation
+from dmoc.configurations.rigid import RigidBody
+
+
+def configuration_of(problem: Any) -> Configuration:
+    """The configuration of a transfer problem's body."""
+    if problem.inertia is None:
+        return Translation(problem.dimension)
+    start_mass = problem.mass if problem.actuator.burns else None
+    return RigidBody(problem.inertia, problem.dimension if problem.start.has_position else 0, start_mass)

@@ -1,0 +1,89 @@
+"""What a result file holds of a body that turns, and of its reaction wheels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.quaternions import AXES, QUATERNION
+from dmoc.configurations.coordinates import ATTITUDE, PLACE, WHEELS, Coordinates
+from dmoc.results.netcdf import Table, as_array
+
+# The variables of each kind of block: its coordinates along the path, its velocities at the start and the goal.
+NAMES = {
+    PLACE: ("position", "start_velocity", "goal_velocity"),
+    WHEELS: ("wheel_integral", "start_wheel_momentum", "goal_wheel_momentum"),
+    ATTITUDE: ("attitude", "start_rate", "goal_rate"),
+}
+
+
+def turning_variables(solution: Any, at: str, between: str) -> dict[str, tuple]:
+    """Dimensions, values, unit and words of every variable; none for a point mass.
+
+    `at` is the dimension along which controls stand, `between` says what they are between nodes.
+    """
+    path, made = solution.path, solution.path.coordinates
+    if not made.turns:
+        return {}
+    ends = {"start": path.start_velocity, "goal": path.goal_velocity}
+    found: dict[str, tuple] = {
+        "attitude": (("node", "quaternion"), solution.attitude, "1", "unit quaternion, body to space"),
+        "rate": (("end", "body_axis"), solution.rate, "rad/s", "angular rate in body axes"),
+        "spin": (("end", "body_axis"), solution.spin, "m2/s", "angular momentum per unit mass, body axes"),
+        "torque": ((at, "body_axis"), solution.torque, "N m", f"torque in body axes{between}"),
+        "reaction": (("node", "constraint"), path.reaction, "m2/s2", "constraint force per unit mass"),
+    }
+    for end, moving in ends.items():
+        found[f"{end}_rate"] = (("body_axis",), moving[made.rates], "rad/s", f"rate at the {end}")
+    if made.spins.any():
+        stored = path.position[:, made.kinds == WHEELS]
+        words, motors = "angular momentum of each reaction wheel", f"motor torque on each wheel{between}"
+        found |= {
+            "wheel_integral": (("node", "wheel"), stored, "N m s2", f"time integral of the {words}"),
+            "wheel_momentum": (("end", "wheel"), solution.wheel_momentum, "N m s", words),
+            "wheel_torque": ((at, "wheel"), solution.wheel_torque, "N m", motors),
+        }
+        for end, moving in ends.items():
+            held = moving[made.spins]
+            found[f"{end}_wheel_momentum"] = (("wheel",), held, "N m s", f"{words} at the {end}")
+    return found
+
+
+def turning_fields(table: Table) -> dict[str, np.ndarray]:
+    """The fields of a solution that a file holds of a body that turns."""
+    names = [*["rate", "spin", "torque"] * ("attitude" in table)]
+    names += ["wheel_momentum", "wheel_torque"] * ("wheel_integral" in table)
+    return {name: as_array(table, name) for name in names}
+
+
+def turning_path(table: Table) -> tuple[Coordinates | None, np.ndarray, np.ndarray, np.ndarray]:
+    """What coordinates in a file are made of (None: of a place), they, and the velocities at both ends."""
+    if "attitude" not in table:
+        position, start, goal = (as_array(table, name) for name in NAMES[PLACE])
+        return None, position, start, goal
+    wheels = as_array(table, "wheel_integral").shape[1] if "wheel_integral" in table else 0
+    made = Coordinates.of_body(as_array(table, "position").shape[1], wheels)
+    kinds = [block.kind for block in made.blocks]
+    position, start, goal = (
+        np.concatenate([as_array(table, NAMES[kind][which]) for kind in kinds], axis=-1)
+        for which in range(len(NAMES[PLACE]))
+    )
+    return made, position, start, goal
+
+
+def turning_shapes(solution: Any, nodes: int, controls: int) -> dict[str, tuple]:
+    """Arrays and the shapes that they must have."""
+    path, ends = solution.path, solution.steps + 1
+    if not path.attitudes:
+        return {}
+    found = {
+        "rate": (solution.rate, (ends, AXES)),
+        "spin": (solution.spin, (ends, AXES)),
+        "torque": (solution.torque, (controls, AXES)),
+        "attitude": (path.attitudes[0], (nodes, QUATERNION)),
+    }
+    if wheels := int(path.coordinates.spins.sum()):
+        found["wheel_momentum"] = (solution.wheel_momentum, (ends, wheels))
+        found["wheel_torque"] = (solution.wheel_torque, (controls, wheels))
+    return found
