@@ -111,7 +111,7 @@ def _zone_excess(evidence: Evidence) -> Iterable[Excess]:
     for cut in cuts(evidence.problem.constraints, evidence.path, evidence.node_velocity, *scales):
         yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
     if evidence.path.attitudes:
-        rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)[:, evidence.rates]
+        rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
         for cut in turn_cuts(evidence.problem.constraints, evidence.path, evidence.begin, rates):
             yield Excess(cut.name, cut.value, cut.allowed, cut.unit)
 

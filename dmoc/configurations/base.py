@@ -124,8 +124,11 @@ class Configuration(ABC):
         """The body as effects see it."""
 
     @abstractmethod
-    def generalised(self, q: Any, force: Any, torque: Any) -> Any:
-        """The column of the size of q by which a force [N] and a torque in body axes [N m] act; None is 0."""
+    def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
+        """The column of the size of q by which forces act; None is 0.
+
+        They are a force [N], a torque in body axes [N m] and the torques on reaction wheels [N m].
+        """
 
     def rotation(self, q: Any) -> Any:
         """R(q), which turns body axes into space axes; None for a body without an attitude."""
@@ -156,5 +159,5 @@ class Translation(Configuration):
     def body(self, q: Any, v: Any) -> Body:
         return Body(q, v)
 
-    def generalised(self, q: Any, force: Any, torque: Any) -> Any:
+    def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         return force

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dmoc.configurations.base import Configuration, Translation
+from dmoc.configurations.gyrostat import Gyrostat
 from dmoc.configurations.rigid import RigidBody
 
 
@@ -13,4 +14,6 @@ def configuration_of(problem: Any) -> Configuration:
     if problem.inertia is None:
         return Translation(problem.dimension)
     start_mass = problem.mass if problem.actuator.burns else None
-    return RigidBody(problem.inertia, problem.dimension if problem.start.has_position else 0, start_mass)
+    of_body = problem.inertia, problem.dimension if problem.start.has_position else 0, start_mass
+    wheels = problem.actuator.wheel_axes
+    return Gyrostat(*of_body, wheels) if wheels else RigidBody(*of_body)

@@ -36,6 +36,11 @@ class RigidBody(Configuration):
     start_mass: float | None = None
 
     @property
+    def before(self) -> int:
+        """Number of coordinates before the quaternion, and of velocities before the rate."""
+        return self.axes
+
+    @property
     def names(self) -> tuple[str, ...]:
         return (*AXES[: self.axes], "qs", "qx", "qy", "qz")
 
@@ -62,7 +67,7 @@ class RigidBody(Configuration):
 
     def _split(self, q: Any, v: Any) -> tuple[Any, Any, Any, Any]:
         """Attitude, its slope, velocity in space and rate in body axes w = 2 H' L(q)' v."""
-        attitude, slope = q[self.axes :], v[self.axes :]
+        attitude, slope = q[self.before :], v[self.before :]
         return attitude, slope, v[: self.axes], 2 * columns_of(attitude).T @ slope
 
     def kinetic(self, q: Any, v: Any, m: Any) -> Any:
@@ -73,41 +78,44 @@ class RigidBody(Configuration):
         attitude, slope, linear, rate = self._split(q, v)
         spin = 2 * self._per_mass(m) @ rate
         # w is also -2 H' L(v)' q, which gives the derivative in q.
-        moved = ca.vertcat(ca.SX.zeros(self.axes), -columns_of(slope) @ spin)
+        moved = ca.vertcat(ca.SX.zeros(self.before), -columns_of(slope) @ spin)
         return moved, ca.vertcat(linear, columns_of(attitude) @ spin)
 
     def step_inertia(self, h: Any, q: Sequence, move: Any, m: Any) -> list:
         # The rate is the same at both nodes, 2/h times the vector part of conj(q_0) (q_1 - q_0), in which q_0
         # counts for nothing. Written so, the second derivatives of a step take less than half the instructions.
-        first, last = (node[self.axes :] for node in q)
-        turned = columns_of(first).T @ move[self.axes :]
+        first, last = (node[self.before :] for node in q)
+        turned = columns_of(first).T @ move[self.before :]
         along, spin = move[: self.axes] / h, 4 / h * (self._per_mass(m) @ turned)
         return [ca.vertcat(-along, -columns_of(last) @ spin), ca.vertcat(along, columns_of(first) @ spin)]
 
     def g(self, q: Any) -> Any:
-        attitude = q[self.axes :]
+        attitude = q[self.before :]
         return ca.dot(attitude, attitude) - 1
 
     def pull(self, q: Any, reaction: Any) -> Any:
-        return ca.vertcat(ca.SX.zeros(self.axes), 2 * q[self.axes :] * reaction)
+        return ca.vertcat(ca.SX.zeros(self.before), 2 * q[self.before :] * reaction)
 
     def tangent(self, q: Any) -> Any:
-        return ca.diagcat(ca.DM.eye(self.axes), 0.5 * columns_of(q[self.axes :]))
+        return ca.diagcat(ca.DM.eye(self.before), 0.5 * columns_of(q[self.before :]))
 
     def body(self, q: Any, v: Any) -> Body:
         attitude, _, linear, rate = self._split(q, v)
         return Body(q[: self.axes], linear, attitude, self.rotation(q), rate, self.matrix)
 
-    def generalised(self, q: Any, force: Any, torque: Any) -> Any:
+    def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         zeros = ca.SX.zeros(self.axes), ca.SX.zeros(QUATERNION)
         along = zeros[0] if force is None or not self.axes else force
-        turning = zeros[1] if torque is None else 2 * columns_of(q[self.axes :]) @ torque
+        turning = zeros[1] if torque is None else 2 * columns_of(q[self.before :]) @ torque
         return ca.vertcat(along, turning)
 
     def rotation(self, q: Any) -> Any:
-        return rotation_of(q[self.axes :])
+        return rotation_of(q[self.before :])
 
-    def angular_acceleration(self, rate: Any, torque: Any, m: Any) -> Any:
-        """Euler's equation J dw/dt + w x J w = tau, with the torque per unit mass [m^2/s^2]."""
-        inertia = self._per_mass(m)
-        return ca.solve(inertia, torque - ca.cross(rate, inertia @ rate))
+    def accelerations(self, w: Any, force: Any, torque: Any, spun: Any, m: Any) -> Any:
+        """dw/dt: of the centre of mass, and by Euler's equation J dw/dt + w x J w = tau.
+
+        The force [m/s^2] and the torque in body axes [m^2/s^2] are per unit mass, what acts on wheels is not.
+        """
+        inertia, rate = self._per_mass(m), w[self.before :]
+        return ca.vertcat(force, ca.solve(inertia, torque - ca.cross(rate, inertia @ rate)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.diagnosis.relaxable import LEAST, Relaxable
+from dmoc.diagnosis.relaxable import LEAST, Giving, Relaxable
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.nlp.ipopt import Interrupt
@@ -118,7 +118,7 @@ def cause_of(
     joint = transfer.relaxed(*limits, least=LEAST)
     found = joint(transfer.problem, transfer.guess)
     if not found.feasible:
-        return _unlimited(transfer) or _rows(transfer)
+        return _unlimited(transfer) or _one_alone(transfer, limits) or _rows(transfer)
     if transfer.leaps(found.path):
         return _zones(transfer) or _rows(transfer)
     if found.slack[0] <= MET:
@@ -166,6 +166,17 @@ def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
     near = joint(later.problem, later.guess)
     needs += later.durations(joint, near, longest) if near.feasible else []
     return Cause(needs=tuple(needs), excess=excess)
+
+
+def _one_alone(transfer: Relaxable, limits: list[Giving]) -> Cause | None:
+    """One limit that is enough where all together were not found to be: each has its own scale."""
+    if len(limits) == 1:
+        return None
+    for limit in limits:
+        alone = transfer.relaxed(limit)(transfer.problem, transfer.guess)
+        if alone.feasible and (words := limit.told(alone.slack[0])):
+            return Cause(needs=(words,), excess=float(alone.slack[0]))
+    return None
 
 
 def _unlimited(transfer: Relaxable) -> Cause | None:

@@ -244,5 +244,6 @@ class Relaxable:
         return owner is not None and owner.field == "constraints" and owner.of(self.problem).limits_speed
 
     def _largest_speed(self) -> float | None:
-        speeds = (part.largest_speed() for part in self.problem.constraints)
+        # A limit on a rate or on the momentum of a wheel is no speed along the guess.
+        speeds = (part.largest_speed() for part in self.problem.constraints if part.unit == "m/s")
         return min((speed for speed in speeds if speed), default=None)

@@ -63,6 +63,8 @@ class Body(NamedTuple):
         Angular rate in body axes [rad/s].
     inertia : array or None
         In body axes about the centre of mass [kg m^2], shape (3, 3).
+    wheels : column or None
+        Angular momenta of its reaction wheels about their axes [N m s].
     """
 
     position: Any
@@ -71,6 +73,7 @@ class Body(NamedTuple):
     rotation: Any = None
     rate: Any = None
     inertia: Any = None
+    wheels: Any = None
 
 
 class Effect(Part, ABC):

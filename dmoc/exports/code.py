@@ -66,6 +66,7 @@ def _header(scene: Scene, functions: Sequence[Exported]) -> str:
     states = {macro_of(name)[5:]: size for name, size in scene.names("place").items()}
     states |= {macro_of(name)[5:]: size for name, size in scene.names("speed").items()}
     words = {"AXES": "axes", "QUATERNION": "entries of an attitude", "RATES": "entries of a rate"}
+    words |= {"WHEELS": "reaction wheels"}
     sizes = {
         **{name: (size, words[name]) for name, size in states.items()},
         "STEPS": (scene.steps, "steps"),

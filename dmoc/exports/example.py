@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.exports.functions import Scene
 from dmoc.exports.planner import Planner
-from dmoc.exports.terms import ATTITUDE, PLACE, TERMS
+from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, WHEELS
 
 # A program that calls rollout and residual.
 EXAMPLE = """\
@@ -126,7 +126,8 @@ def _rows_array(name: str) -> str:
 
 
 def _rows_size(name: str) -> str:
-    return {PLACE.residual: "DMOC_AXES", ATTITUDE.residual: "DMOC_RATES"}.get(name, "1")
+    sizes = {PLACE.residual: "DMOC_AXES", ATTITUDE.residual: "DMOC_RATES", WHEELS.residual: "DMOC_WHEELS"}
+    return sizes.get(name, "1")
 
 
 def _told(scene: Scene, residual: ca.Function) -> str:
@@ -150,7 +151,9 @@ def _label(name: str) -> str:
 
 def macro_of(name: str) -> str:
     """The macro that has the number of entries of a part of a state."""
-    return {ATTITUDE.place: "DMOC_QUATERNION", ATTITUDE.speed: "DMOC_RATES"}.get(name, "DMOC_AXES")
+    wheels = {WHEELS.place: "DMOC_WHEELS", WHEELS.speed: "DMOC_WHEELS"}
+    known = {ATTITUDE.place: "DMOC_QUATERNION", ATTITUDE.speed: "DMOC_RATES"} | wheels
+    return known.get(name, "DMOC_AXES")
 
 
 def _c_values(values: Any) -> str:

@@ -88,6 +88,15 @@ TERMS = {
     "residual_torque": Term(
         "N m", "torque minus what the discrete motion needs, in body axes, one column a node"
     ),
+    "wheel_integral": Term("N m s^2", "time integrals of the angular momenta of wheels"),
+    "wheel_momentum": Term("N m s", "angular momenta of wheels about their axes"),
+    "next_wheel_integral": Term("N m s^2", "time integrals at the end of the step"),
+    "next_wheel_momentum": Term("N m s", "angular momenta of wheels at the end of the step"),
+    "wheel_integrals": Term("N m s^2", "time integrals of the momenta of wheels at the nodes"),
+    "wheel_momenta": Term("N m s", "angular momenta of wheels at the step ends, one column an end"),
+    "start_wheel_momentum": Term("N m s", "angular momenta of wheels at the start"),
+    "goal_wheel_momentum": Term("N m s", "angular momenta of wheels at the goal"),
+    "residual_wheels": Term("N m", "motor torque minus what the discrete motion needs, one column a node"),
     "residual_norm": Term("-", "q.q - 1 of the quaternion at every node"),
     "reactions": Term("m^2/s^2", "forces per unit mass that keep the quaternions unit ones, one column a node"),
 }

@@ -159,13 +159,18 @@ def turning_guess(
     control = np.zeros((len(mesh) - 1 if hold else len(fractions), problem.controls))
     _, start, _, goal = turning_states(problem, duration)
     place = None if point is None else path_of_point(point, mesh, order, hold, None, duration)
-    if place is not None:
-        start, goal = np.append(place.start_velocity, start), np.append(place.goal_velocity, goal)
+    wheels = int(body.coordinates.spins.sum())
+    moving = (np.empty(0),) * 2 if place is None else (place.start_velocity, place.goal_velocity)
+    start, goal = (
+        np.concatenate([speed, np.zeros(wheels), rate])
+        for speed, rate in zip(moving, (start, goal), strict=True)
+    )
     if given is not None:
         position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
     else:
         position = attitudes_along(problem, duration, fractions)
-        position = position if place is None else np.hstack([place.position, position])
+        before = np.empty((len(fractions), 0)) if place is None else place.position
+        position = np.hstack([before, np.zeros((len(fractions), wheels)), position])
     ends = ((0, problem.start.fixed(), start), (-1, problem.goal.fixed(), goal))
     for at, (fixed, _), _ in ends:
         position[at] = np.where(np.isnan(fixed), position[at], fixed)

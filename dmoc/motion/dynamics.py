@@ -126,17 +126,17 @@ class Dynamics:
     def _by_euler(self, t: Any, q: Any, w: Any, m: Any, f: Any) -> Any:
         """dw/dt of a rigid body: Newton's equation of its centre of mass and Euler's of its rate."""
         body: Any = self.configuration
-        axes = body.axes
+        axes, before = body.axes, body.before
         _, _, slope, _ = self.symbols()
         dldq, dldv, push = point_function(self.effects, body, kinetic=False)(t, q, slope, m)
-        if ca.depends_on(dldv[axes:], slope):
+        if ca.depends_on(dldv[before:], slope):
             raise ValueError("a BodyConservative's lagrangian depends on the rate; state it as a BodyForce")
         change = ca.jacobian(dldv[:axes], q) @ slope + ca.jacobian(dldv[:axes], t)
         inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
         pulled = dldq + push
         along = ca.solve(inertia, pulled[:axes] + f[:axes] / m - change) if axes else ca.SX.zeros(0)
-        torque = body.along(q, pulled)[axes:] + f[axes:] / m
-        rates = ca.vertcat(along, body.angular_acceleration(w[axes:], torque, m))
+        torque = body.along(q, pulled)[before:] + f[before:] / m
+        rates = body.accelerations(w, along, torque, f[axes:before], m)
         return ca.substitute(rates, slope, body.velocity(q, w))
 
     @remembered_property
@@ -186,13 +186,15 @@ class Dynamics:
 
     @remembered_property
     def wrench(self) -> ca.Function:
-        """(q, u) -> the force in space axes [N] and, for a rigid body, the torque in body axes [N m]."""
+        """(q, u) -> force in space axes [N]; of a rigid body torques on wheels and in body axes, too [N m]."""
         q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)
         force, torque = self.actuator.wrench(self.configuration.rotation(q), u)
         if not self.configuration.surplus:
             return ca.Function("wrench", [q, u], [ca.densify(force)])
-        axes = self.freedom - 3
+        made = self.configuration.coordinates
+        axes, wheels = int(made.speeds.sum()), self.actuator.spun(u)
         parts = [ca.SX.zeros(axes) if force is None or not axes else force]
+        parts.append(ca.SX(0, 1) if wheels is None else wheels)
         parts.append(ca.SX.zeros(3) if torque is None else torque)
         return ca.Function("wrench", [q, u], [ca.densify(ca.vertcat(*parts))])
 
@@ -204,7 +206,8 @@ def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
 
 def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:
     """The force of an actuator on the coordinates q [N], [N m]."""
-    return configuration.generalised(q, *actuator.wrench(configuration.rotation(q), u))
+    force, torque = actuator.wrench(configuration.rotation(q), u)
+    return configuration.generalised(q, force, torque, actuator.spun(u))
 
 
 def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

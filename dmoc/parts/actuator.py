@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import up
+from dmoc.parts.constraint import Constraint
 from dmoc.parts.rows import Row
 
 
@@ -99,6 +100,20 @@ class Actuator(ABC):
         `rotation` is R(q), which turns body axes into space axes; None for a point mass.
         """
         return self.force(u), None
+
+    @property
+    def wheel_axes(self) -> tuple[tuple[float, ...], ...]:
+        """The axes of the reaction wheels that it turns, unit vectors in body axes; none by default."""
+        return ()
+
+    @property
+    def own_limits(self) -> tuple[Constraint, ...]:
+        """Limits on the motion that belong to it, such as on the momenta of wheels."""
+        return ()
+
+    def spun(self, u: Any) -> Any:
+        """Torques on the reaction wheels [N m]; None where there are none."""
+        return None
 
     def effort(self, u: Any) -> Any:
         """The square that `Effort` integrates: of the force or, where it turns the body, of all controls."""

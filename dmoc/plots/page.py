@@ -26,7 +26,7 @@ from dmoc.plots.style import (
     readable,
     speeds,
 )
-from dmoc.plots.turning import control_panels, draw_angle, draw_controls, draw_rates, draw_sphere
+from dmoc.plots.turning import control_panels, draw_angle, draw_controls, draw_rates, draw_sphere, draw_wheels
 from dmoc.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -118,7 +118,8 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
 def _turning_panels(solution: Solution) -> list[Any]:
     """What is drawn over time of a body that turns: its controls by their units, rates and the angle to go."""
     controls = [partial(draw_controls, panel=panel) for panel in control_panels(solution)]
-    return [*controls, draw_rates, draw_angle]
+    stored = [] if solution.wheel_momentum is None else [draw_wheels]
+    return [*controls, *stored, draw_rates, draw_angle]
 
 
 def _panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[Any, list[Any]]:

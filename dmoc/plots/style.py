@@ -19,6 +19,9 @@ from dmoc.results.solution import Solution
 AXIS_COLOURS = ("#0072B2", "#D55E00", "#009E73")
 # The curves of x, y and z have these lines, which stay apart without colour, too.
 AXIS_LINES = ("-", (0, (5, 2)), (0, (4, 1.5, 1, 1.5)))
+# The curves of a few thrusters or wheels have these colours, and these lines.
+CHANNEL_COLOURS = (*AXIS_COLOURS, "#CC79A7", "#E69F00", "#56B4E9")
+CHANNEL_LINES = (*AXIS_LINES, (0, (1, 1)), (0, (7, 2)), (0, (7, 2, 1, 2, 1, 2)))
 # Texts, edges and magnitudes are of this dark grey.
 DARK = "#222222"
 # Lines in the background, such as limits, are of this pale grey.

@@ -10,6 +10,8 @@ from dmoc.basics.quaternions import angle_between, normalised, rotated
 from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,
+    CHANNEL_COLOURS,
+    CHANNEL_LINES,
     DARK,
     FORBIDDEN,
     LIMIT,
@@ -115,8 +117,7 @@ def draw_controls(axes: Any, solution: Solution, late: float, panel: tuple[str, 
         return
     size, shown = readable(control, unit) if unit in ("N", "N m") else (1.0, unit)
     for i, (name, values) in enumerate(zip(labels, control.T, strict=True)):
-        style = {"color": AXIS_COLOURS[i % 3], "linestyle": AXIS_LINES[i % 3], "label": name, "linewidth": 1.8}
-        axes.plot(times / late, values / size, **style)
+        axes.plot(times / late, values / size, label=name, **_channel(i))
     actuator = solution.problem.actuator if solution.problem else None
     if actuator is not None:
         sides = np.concatenate([np.asarray(side, float)[channels] for side in actuator.bounds(3)])
@@ -154,10 +155,31 @@ def draw_rates(axes: Any, solution: Solution, late: float) -> None:
         ends, np.linalg.norm(rates, axis=1) / size, color=DARK, linestyle=(0, (1, 1)), label="$|\\omega|$"
     )
     for constraint in solution.problem.constraints if solution.problem else ():
-        if constraint.turns_body and (limit := constraint.largest_speed()) is not None:
+        if constraint.unit == "rad/s" and (limit := constraint.largest_speed()) is not None:
             axes.axhline(limit / size, label="limit", **LIMIT)
     axes.set_ylabel(f"rate [{unit}]")
     axes.set_title("Rates about the body axes")
+
+
+def draw_wheels(axes: Any, solution: Solution, late: float) -> None:
+    """Angular momenta of reaction wheels at the step ends, and the most that they store."""
+    held = solution.wheel_momentum
+    assert held is not None
+    for i, values in enumerate(held.T):
+        axes.plot(solution.end_times / late, values, label=f"wheel{i + 1}", **_channel(i))
+    largest = float(np.abs(held).max(initial=0.0))
+    for constraint in solution.problem.constraints if solution.problem else ():
+        if constraint.unit == "N m s" and (limit := constraint.largest_speed() or 0.0) <= 4 * largest:
+            for side in (limit, -limit):
+                axes.axhline(side, label="limit", **LIMIT)
+    axes.set_ylabel("momentum [N m s]")
+    axes.set_title("What the wheels store")
+
+
+def _channel(index: int) -> dict[str, Any]:
+    """The look of one curve of several that are no axes."""
+    place = index % len(CHANNEL_COLOURS)
+    return {"color": CHANNEL_COLOURS[place], "linestyle": CHANNEL_LINES[place], "linewidth": 1.8}
 
 
 def draw_angle(axes: Any, solution: Solution, late: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -43,19 +42,18 @@ def goal_words(problem: TransferProblem) -> str:
 
 def met_words(solution: Solution) -> str:
     """Where a goal that moves is met, such as `goal met at (1.5, 0) m`; empty for one that does not."""
-    moves = _moves(solution.require_problem().goal)
-    return f"goal met at {_point(solution.position[-1])} m" if moves else ""
-
-
-def _moves(end: Boundary) -> bool:
-    """Whether the place of an end is known, but only at a given time."""
-    return end.anchored and any(map(math.isnan, end.fixed()[0]))
+    if not solution.require_problem().goal.moves:
+        return ""
+    if solution.attitude is not None and not solution.dimension:
+        return f"goal met at the attitude {_point(solution.attitude[-1])}"
+    return f"goal met at {_point(solution.position[-1])} m"
 
 
 def _places(end: Boundary, times: Sequence[float]) -> str:
-    if not _moves(end):
+    if not end.moves:
         return ""
-    places = [f"at {_point(end.estimate(time)[0])} m at {lasting(time)}" for time in times]
+    unit = " m" if end.has_position else ""
+    places = [f"at {_point(end.estimate(time)[0])}{unit} at {lasting(time)}" for time in times]
     return ", " + " and ".join(places)
 
 

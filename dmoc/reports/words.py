@@ -56,10 +56,17 @@ def scene(problem: TransferProblem) -> RenderableType:
             ("duration", free if problem.free_duration else lasting(shortest, 6)),
             ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
             ("actuator", problem.actuator.words()),
-            ("objective", problem.objective.words().rstrip(".")),
+            ("objective", _objective(problem)),
             ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
         ]
     )
+
+
+def _objective(problem: TransferProblem) -> str:
+    """What is minimised, in the unit that it has with the actuator."""
+    objective = problem.objective
+    unit = objective.unit_with(problem.actuator)
+    return objective.words().rstrip(".").replace(f"[{objective.unit}]", f"[{unit}]")
 
 
 def prose(docstring: str) -> str:

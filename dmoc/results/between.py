@@ -112,7 +112,7 @@ def cuts(
 
 
 def turn_cuts(
-    constraints: Sequence[Constraint], path: DiscretePath, start_time: float, rates: np.ndarray
+    constraints: Sequence[Constraint], path: DiscretePath, start_time: float, velocity: np.ndarray
 ) -> Iterator[Cut]:
     """Limits on attitude and rate of a body, at the nodes and between them.
 
@@ -125,8 +125,8 @@ def turn_cuts(
     path : DiscretePath
     start_time : float
         [s].
-    rates : array, shape (nodes, 3)
-        Rate in body axes at every node [rad/s].
+    velocity : array, shape (nodes, freedom)
+        Independent velocities at every node.
     """
     ours = [(i, constraint) for i, constraint in enumerate(constraints) if constraint.turns_body]
     if not ours:
@@ -138,18 +138,19 @@ def turn_cuts(
     inside = normalised(found).reshape(-1, QUATERNION)
     fractions = (path.mesh[:-1, None] + np.diff(path.mesh)[:, None] * places).ravel()
     times = start_time + path.duration * path.fractions
-    turned, none = path.largest_turn, np.empty(0, int)
-    sway = 0.5 * _bump(path, rates)
+    apart, none = path.largest_turn, np.empty(0, int)
     for i, constraint in ours:
         name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
-        at_nodes = _most(constraint.excess_at(times, attitude, rates))
+        turned, moving = constraint.seen(path.position, velocity)
+        at_nodes = _most(constraint.excess_at(times, turned, moving))
         if constraint.limits_speed:
             limit = constraint.largest_speed() or 0.0
-            yield Cut(name, i, at_nodes, BOUND * limit + min(sway, DEEPEST * limit), unit, none)
+            sway = min(0.5 * _bump(path, moving), DEEPEST * limit)
+            yield Cut(name, i, at_nodes, BOUND * limit + sway, unit, none)
             continue
         yield Cut(f"{name} at nodes", i, at_nodes, np.degrees(BOUND), unit, none)
         angle = np.radians(constraint.feature_angle())
-        depth = turned**2 / (8 * np.tan(min(angle, np.pi - angle)) or 1.0)
+        depth = apart**2 / (8 * np.tan(min(angle, np.pi - angle)) or 1.0)
         allowed = float(np.degrees(BOUND + min(depth, DEEPEST * angle)))
         between = constraint.excess_at(
             start_time + path.duration * fractions, inside, np.zeros((len(inside), 3))

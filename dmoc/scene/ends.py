@@ -108,6 +108,11 @@ class Boundary(ABC):
         """Whether the estimate of the position stands by itself, without the other end."""
         return not np.isnan(self.fixed()[0]).any()
 
+    @property
+    def moves(self) -> bool:
+        """Whether its place is known, but only at a given time."""
+        return self.anchored and bool(np.isnan(self.fixed()[0]).any())
+
     @abstractmethod
     def words(self) -> str:
         """One line for a person."""

@@ -21,6 +21,7 @@ from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
 from dmoc.scene.inertia import check_acts_on, check_body_effect, turning_checked
+from dmoc.scene.wheels import with_wheels
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -96,6 +97,7 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        checked(self, **with_wheels(self.actuator, self.start, self.goal, tuple(self.constraints)))
         checked(self, **turning_checked(self.inertia, self.start, self.goal))
         self._complete_ends()
         if self.objective.metered:

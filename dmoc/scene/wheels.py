@@ -1,0 +1,105 @@
+"""Ends of a body that carries reaction wheels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.quaternions import AXES, QUATERNION
+from dmoc.bodies.wheels import MomentumLimit
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.rows import Row
+from dmoc.scene.ends import Boundary
+
+
+@dataclass(frozen=True)
+class WithWheels(Boundary):
+    """An end of the body alone, and the angular momenta of its reaction wheels [N m s]; None is free.
+
+    `turned` are the time integrals of the momenta, which count from the start.
+    """
+
+    body: Boundary
+    momenta: tuple[float | None, ...]
+    turned: tuple[float | None, ...]
+
+    @property
+    def dimension(self) -> int:
+        return self.body.dimension
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), type(self.body), self.body.structure, len(self.momenta)
+
+    @property
+    def has_position(self) -> bool:
+        return self.body.has_position
+
+    @property
+    def turns_body(self) -> bool:
+        return True
+
+    @property
+    def point(self) -> Boundary:
+        return self.body.point
+
+    @property
+    def anchored(self) -> bool:
+        return self.body.anchored
+
+    @property
+    def moves(self) -> bool:
+        return self.body.moves
+
+    def oriented(self, start: Boundary) -> Boundary:
+        return replace(self, body=self.body.oriented(getattr(start, "body", start)))
+
+    def the_other_way(self) -> Boundary:
+        return replace(self, body=self.body.the_other_way())
+
+    def _joined(self, state: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """A state of the body alone with the entries of the wheels before its attitude and its rate."""
+        q, v = state
+        turned, held = np.array(self.turned, float), np.array(self.momenta, float)
+        return (
+            np.concatenate([q[:-QUATERNION], turned, q[-QUATERNION:]]),
+            np.concatenate([v[:-AXES], held, v[-AXES:]]),
+        )
+
+    def fixed(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._joined(self.body.fixed())
+
+    def estimate(self, t: float, near: tuple | None = None) -> tuple[np.ndarray, np.ndarray]:
+        return self._joined(self.body.estimate(t))
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        def alone(column: Any, last: int) -> Any:
+            axes = column.numel() - last - len(self.momenta)
+            return ca.vertcat(column[:axes], column[-last:])
+
+        return self.body.rows(t, alone(q, QUATERNION), alone(v, AXES), m)
+
+    def words(self) -> str:
+        held = ", ".join("free" if value is None else f"{value:g}" for value in self.momenta)
+        return f"{self.body.words()}, wheels with ({held}) N m s"
+
+
+def with_wheels(actuator: Actuator, start: Boundary, goal: Boundary, limits: tuple) -> dict[str, Any]:
+    """The ends and the constraints of a problem whose actuator has wheels; as they are where it has none.
+
+    Ends that were completed for wheels before are completed anew.
+    """
+    bodies = [getattr(end, "body", end) for end in (start, goal)]
+    others = tuple(limit for limit in limits if not isinstance(limit, MomentumLimit))
+    count = len(actuator.wheel_axes)
+    if count and all(body.turns_body for body in bodies):
+        held = getattr(actuator, "start_momentum", None), getattr(actuator, "goal_momentum", None)
+        turned = (0.0,) * count, (None,) * count
+        bodies = [
+            WithWheels(body, momenta or free, integrals)
+            for body, momenta, free, integrals in zip(bodies, held, turned, turned, strict=True)
+        ]
+    return {"start": bodies[0], "goal": bodies[1], "constraints": (*others, *actuator.own_limits)}
