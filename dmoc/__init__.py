@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dmoc.bodies.thrusters import Thrusters as Thrusters
     from dmoc.bodies.torques import Torque as Torque
     from dmoc.bodies.torques import Wrench as Wrench
+    from dmoc.bodies.wheels import MomentumLimit as MomentumLimit
     from dmoc.bodies.wheels import Wheels as Wheels
     from dmoc.checks.evidence import Evidence as Evidence
     from dmoc.checks.verification import Check as Check

@@ -116,12 +116,18 @@ class Thrusters(OnBody, Burner):
     def force_limit(self) -> float | None:
         return None if self.max_thrust is None else float(np.max(self.max_thrust))
 
+    def _arms(self) -> np.ndarray:
+        """The torque of each thruster for a thrust of 1 N [m], shape (count, 3)."""
+        return np.cross(np.array(self.positions), np.array(self.directions))
+
+    @property
+    def turns_every_way(self) -> bool:
+        return bool(np.linalg.matrix_rank(self._arms()) == AXES)
+
     def turning_limit(self) -> float | None:
         if self.max_thrust is None:
             return None
-        arms = (
-            np.cross(np.array(self.positions), np.array(self.directions)) * np.array(self.max_thrust)[:, None]
-        )
+        arms = self._arms() * np.array(self.max_thrust)[:, None]
         # Of the thrusters that turn the body one way about an axis, all fire: the weakest axis counts.
         ways = [np.maximum(sign * arms, 0).sum(axis=0) for sign in (1, -1)]
         weakest = float(np.min(np.maximum(*ways) if self.both_ways else np.minimum(*ways)))

@@ -151,6 +151,10 @@ class Wheels(OnBody):
         about = np.abs(np.array(self.axes)).T @ np.broadcast_to(np.asarray(self.max_torque), self.count)
         return float(about.min()) or self.torque_limit()
 
+    @property
+    def turns_every_way(self) -> bool:
+        return bool(np.linalg.matrix_rank(np.array(self.axes)) == AXES)
+
     def times(self, factor: float) -> Wheels:
         return replace(self, max_torque=times_each(self.max_torque, factor))
 

@@ -15,6 +15,7 @@ from dmoc.basics.docstrings import documented
 from dmoc.exports.terms import Term
 from dmoc.nlp.solving import NLP
 from dmoc.parts.rows import title
+from dmoc.scene.ends import Boundary
 from dmoc.scene.problem import TransferProblem
 
 # How a bound or parameter depends on a number is found by evaluating it at this value [in the number's SI
@@ -26,7 +27,12 @@ HUGE = 2.0**100
 AFFINE = 1e-12
 # Fields whose arguments are called otherwise: an attitude has one name in all functions, and limits that of the
 # argument their part is made with.
-CALLED = {"quaternion": "attitude", "most_force": "force_limit", "most_torque": "torque_limit"}
+CALLED = {
+    "quaternion": "attitude",
+    "most_force": "force_limit",
+    "most_torque": "torque_limit",
+    "momenta": "wheel_momentum",
+}
 
 
 @dataclass(frozen=True)
@@ -125,10 +131,17 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
         documented_as = field if field in entries else called
         unit = entries[documented_as].unit if documented_as in entries else ""
         value = getattr(part, field)
+        if isinstance(value, Boundary):
+            # An end of a body that carries wheels is one of the body alone, and the wheels.
+            yield from _numbers_of_part(value, owner, partial(_put_inside, put, part, field))
         words = f"{called.replace('_', ' ')} of the {owner.replace('_', ' ')} ({type(part).__name__})"
         if _is_number(value):
             free = "; entries that the problem leaves free are ignored" if None in np.atleast_1d(value) else ""
             yield _number(part, field, f"{owner}_{called}", Term(unit, words + free), put)
+
+
+def _put_inside(put: Callable[[Any], TransferProblem], part: Any, field: str, twin: Any) -> TransferProblem:
+    return put(_with(part, field, twin))
 
 
 def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], TransferProblem]) -> Number:

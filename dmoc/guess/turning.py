@@ -62,6 +62,8 @@ def attitudes_along(problem: TransferProblem, duration: float, fractions: np.nda
     """The attitude by a turn of about constant rate, shape (nodes, 4), without a change of sign."""
     q0, _, q1, _ = turning_states(problem, duration)
     path = slerp(q0, q1, fractions)
+    if not problem.actuator.turns_every_way:
+        return path
     axis = rotation_vectors(times(conjugate(q0), q1))
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     aside = aside / (np.linalg.norm(aside) or 1.0)

@@ -161,6 +161,11 @@ class Actuator(ABC):
         """About the torque by which it turns a body when it does its best [N m]; None if there is no limit."""
         return self.torque_limit()
 
+    @property
+    def turns_every_way(self) -> bool:
+        """Whether it can turn a body about every axis."""
+        return True
+
     def main_limit(self) -> float | None:
         """Its force limit [N] or, where it makes no force or a free one, its torque limit [N m]."""
         return self.torque_limit() if self.force_limit() is None else self.force_limit()

@@ -172,7 +172,7 @@ def draw_wheels(axes: Any, solution: Solution, late: float) -> None:
         if constraint.unit == "N m s" and (limit := constraint.largest_speed() or 0.0) <= 4 * largest:
             for side in (limit, -limit):
                 axes.axhline(side, label="limit", **LIMIT)
-    axes.set_ylabel("momentum [N m s]")
+    axes.set_ylabel("h [N m s]")
     axes.set_title("What the wheels store")
 
 

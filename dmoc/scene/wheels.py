@@ -17,14 +17,21 @@ from dmoc.scene.ends import Boundary
 
 @dataclass(frozen=True)
 class WithWheels(Boundary):
-    """An end of the body alone, and the angular momenta of its reaction wheels [N m s]; None is free.
+    """An end of the body alone, and what its reaction wheels hold there.
 
-    `turned` are the time integrals of the momenta, which count from the start.
+    Parameters
+    ----------
+    body : Boundary
+        The end without wheels.
+    momenta : sequence of float or None
+        Angular momentum of each wheel [N m s]; an entry that is None is free.
+    counted : bool
+        Whether the time integrals of the momenta count from here.
     """
 
     body: Boundary
     momenta: tuple[float | None, ...]
-    turned: tuple[float | None, ...]
+    counted: bool
 
     @property
     def dimension(self) -> int:
@@ -63,7 +70,8 @@ class WithWheels(Boundary):
     def _joined(self, state: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """A state of the body alone with the entries of the wheels before its attitude and its rate."""
         q, v = state
-        turned, held = np.array(self.turned, float), np.array(self.momenta, float)
+        held = np.array(self.momenta, float)
+        turned = np.full(len(held), 0.0 if self.counted else np.nan)
         return (
             np.concatenate([q[:-QUATERNION], turned, q[-QUATERNION:]]),
             np.concatenate([v[:-AXES], held, v[-AXES:]]),
@@ -97,9 +105,9 @@ def with_wheels(actuator: Actuator, start: Boundary, goal: Boundary, limits: tup
     count = len(actuator.wheel_axes)
     if count and all(body.turns_body for body in bodies):
         held = getattr(actuator, "start_momentum", None), getattr(actuator, "goal_momentum", None)
-        turned = (0.0,) * count, (None,) * count
+        free: tuple = (0.0,) * count, (None,) * count
         bodies = [
-            WithWheels(body, momenta or free, integrals)
-            for body, momenta, free, integrals in zip(bodies, held, turned, turned, strict=True)
+            WithWheels(body, momenta or otherwise, counted)
+            for body, momenta, otherwise, counted in zip(bodies, held, free, (True, False), strict=True)
         ]
     return {"start": bodies[0], "goal": bodies[1], "constraints": (*others, *actuator.own_limits)}
