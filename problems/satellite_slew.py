@@ -1,4 +1,4 @@
-"""A satellite turns by 120 degrees with four reaction wheels in a pyramid, none of which may store too much."""
+"""Turn a satellite by 120 degrees with four reaction wheels, none of which may store too much."""
 
 from dmoc import Attitude, TransferProblem, Wheels, rotation
 
