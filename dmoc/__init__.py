@@ -59,6 +59,10 @@ if TYPE_CHECKING:
     from dmoc.effects.bodies import PlateRadiation as PlateRadiation
     from dmoc.effects.bodies import Plates as Plates
     from dmoc.exports.export import export as export
+    from dmoc.links.holonomic import Holonomic as Holonomic
+    from dmoc.links.rods import Rod as Rod
+    from dmoc.links.rods import Slider as Slider
+    from dmoc.links.rods import Surface as Surface
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate
     from dmoc.nlp.solving import NLP as NLP

@@ -17,7 +17,7 @@ LAYERS = [
     ["effects"],
     ["configurations"],
     ["parts"],
-    ["bodies"],
+    ["bodies", "links"],
     ["scene"],
     ["motion"],
     ["guess", "results"],

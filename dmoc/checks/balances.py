@@ -28,6 +28,8 @@ def balance(evidence: Evidence) -> tuple[float, float]:
     )
     # Added up over a step, the parts of the inertia cancel, and the impulse is left.
     given = _in_space(evidence, nodes, impulse).reshape(*evidence.at.shape, -1).sum(axis=0)
+    held = _in_space(evidence, evidence.position, evidence.reactions)
+    given = np.concatenate([given, held])
     change, speeds = (last - first)[0], evidence.speeds
     gross = float(np.abs(given[:, speeds]).sum()) + evidence.speed
     off = np.abs(change - given.sum(axis=0))

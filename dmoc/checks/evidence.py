@@ -20,6 +20,7 @@ from dmoc.motion.momenta import (
     node_velocities,
     step_matrices,
     velocity_along,
+    without_reactions,
 )
 from dmoc.motion.scales import Scales, path_scales, wheel_momentum
 from dmoc.results.solution import Solution, reported
@@ -125,12 +126,37 @@ class Evidence:
         rows = along_path(self.dynamics, self.position, rows)
         rows[0] += self.boundary_momentum(0)
         rows[-1] -= self.boundary_momentum(-1)
-        return rows
+        return without_reactions(self.dynamics, self.time, self.position, self.mass, rows)
+
+    @cached_property
+    def reactions(self) -> np.ndarray:
+        """Impulses of links at every node along the velocities, per unit mass, shape (nodes, freedom)."""
+        held = self.dynamics.configuration.joined
+        if not held or self.path.reaction is None:
+            return np.zeros((len(self.position), self.dynamics.freedom))
+        bars = self.dynamics.bars(self.position.T).full().reshape(held, len(self.position), -1)
+        return -np.einsum("rkn,kr->kn", bars, self.path.reaction[:, -held:]) * self.weights[:, None]
 
     @cached_property
     def matrices(self) -> np.ndarray:
         """Derivative of the one-step map along the path, shape (steps, 2 axes, 2 axes) [SI]."""
         return step_matrices(self.dynamics, self.path, self.begin)
+
+    def link_gaps(self) -> tuple[np.ndarray, np.ndarray]:
+        """The largest gap of a link at every node over the extent, and rate of opening at every step end [-].
+
+        The rate is that of the velocities reported, over the speed.
+        """
+        body = self.dynamics.configuration
+        if not body.joined:
+            return np.empty(0), np.empty(0)
+        q, w = ca.SX.sym("q", body.size), ca.SX.sym("w", body.freedom)
+        gap = ca.Function("gap", [q], [ca.densify(body.links_at(q))])(self.position.T).full()
+        rate = ca.Function("rate", [q, w], [ca.densify(body.opening(q, w))])
+        velocity = self.velocity.copy()
+        velocity[0], velocity[-1] = self.path.start_velocity, self.path.goal_velocity
+        opening = rate(self.position[self.ends].T, velocity.T).full()
+        return np.abs(gap).max(axis=0) / self.extent, np.abs(opening).max(axis=0) / self.speed
 
     # The checks judge those numbers by the scales that follow.
 
@@ -207,6 +233,20 @@ class Evidence:
             wheel_momentum(self.path),
             self.path.duration,
         )
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Sizes of the ways to move, and of momenta, one entry a freedom each."""
+        return np.concatenate([self.scales.positions, np.where(self.speeds, self.speed, self.spin)])
+
+    @cached_property
+    def in_size(self) -> np.ndarray:
+        """What makes the entries of `matrices` shares of the sizes."""
+        free = self.dynamics.freedom
+        ways = free - self.dynamics.configuration.joined
+        # In the ways that links let be all places have one size.
+        sizes = np.concatenate([part[:ways] for part in np.split(self.sizes, 2)])
+        return sizes / sizes[:, None]
 
     @cached_property
     def typical_force(self) -> float:

@@ -117,7 +117,8 @@ def verify(
         evidence = Evidence(solution)
         undefined = evidence.undefined()
         turning = evidence.path.attitudes
-        ours = [(name, check) for name, check in CHECKS.items() if turning or check is not _constraint]
+        held = turning or evidence.problem.links
+        ours = [(name, check) for name, check in CHECKS.items() if held or check is not _constraint]
         wanted = [*ours, *_own(more)]
         checks = tuple(
             Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
@@ -160,10 +161,14 @@ def _residual(evidence: Evidence) -> Check:
 
 
 def _constraint(evidence: Evidence) -> Check:
-    """The constraint g(q) = 0 of the coordinates at every node."""
-    lengths = [np.abs(np.sum(q * q, axis=1) - 1) for q in evidence.path.attitudes]
-    node = int(np.argmax(lengths[0]))
-    return Check.of("constraint", lengths[0][node], CONSTRAINT, "-", f"|q.q - 1| at node {node}")
+    """The constraint g(q) = 0 of the coordinates at every node, and of velocities at every step end."""
+    gaps = [("|q.q - 1| at node", np.abs(np.sum(q * q, axis=1) - 1)) for q in evidence.path.attitudes]
+    gaps += zip(("gap of a link at node", "opening of a link at step end"), evidence.link_gaps(), strict=True)
+    worst = max(range(len(gaps)), key=lambda i: gaps[i][1].max(initial=-1.0))
+    words, values = gaps[worst]
+    place = int(np.argmax(values))
+    unit = "-" if worst < len(evidence.path.attitudes) else "of the path"
+    return Check.of("constraint", values[place], CONSTRAINT, unit, f"{words} {place}")
 
 
 def _rollout(evidence: Evidence) -> Check:
@@ -171,10 +176,10 @@ def _rollout(evidence: Evidence) -> Check:
     begin = evidence.boundary_momentum(0)
     q, p = rollout(evidence.dynamics, evidence.path, evidence.begin, evidence.position[0], begin)
     miss = apart(evidence.path.coordinates, q, evidence.position[evidence.ends])
-    slip, scales = p - evidence.momentum, evidence.scales
-    sizes = np.concatenate([scales.positions, np.where(evidence.speeds, evidence.speed, evidence.spin)])
+    slip = p - evidence.momentum
+    sizes = evidence.sizes
     off = np.abs(np.concatenate([miss, slip], axis=1)).max(axis=0)
-    growth = _amplification(evidence.matrices * sizes / sizes[:, None])
+    growth = _amplification(evidence.matrices * evidence.in_size)
     turned = ROUNDING * evidence.acceleration * evidence.path.duration
     floor = (
         evidence.rounding / evidence.extent + (evidence.rounding / evidence.shortest + turned) / evidence.speed

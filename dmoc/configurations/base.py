@@ -77,8 +77,30 @@ class Configuration(ABC):
 
     @property
     def surplus(self) -> int:
-        """Number of entries of the constraint g."""
+        """Number of coordinates beyond the velocities, as of a unit quaternion."""
         return self.size - self.freedom
+
+    @property
+    def joined(self) -> int:
+        """Number of equations by which links hold it: its velocities depend on each other by as many."""
+        return 0
+
+    @property
+    def conditions(self) -> int:
+        """Number of entries of the constraint g: first those of unit quaternions, then those of links."""
+        return self.surplus + self.joined
+
+    def links_at(self, q: Any) -> Any:
+        """The entries of g that belong to links."""
+        return ca.SX.zeros(0)
+
+    def opening(self, q: Any, w: Any) -> Any:
+        """The rates at which links would open, C(q) w: zero where they hold."""
+        return ca.SX.zeros(0)
+
+    def bars(self, q: Any) -> Any:
+        """C(q), the slope of the links along the independent velocities, shape (joined, freedom)."""
+        return ca.SX(0, self.freedom)
 
     @abstractmethod
     def kinetic(self, q: Any, v: Any, m: Any) -> Any:

@@ -6,11 +6,23 @@ from typing import Any
 
 from dmoc.configurations.base import Configuration, Translation
 from dmoc.configurations.gyrostat import Gyrostat
+from dmoc.configurations.linked import Linked
 from dmoc.configurations.rigid import RigidBody
 
 
 def configuration_of(problem: Any) -> Configuration:
     """The configuration of a transfer problem's body."""
+    free = _free(problem)
+    return Linked(free, problem.links) if problem.links else free
+
+
+def link_sizes(problem: Any) -> list[int]:
+    """How many equations each link of a problem is."""
+    return [Linked(_free(problem), (link,)).joined for link in problem.links]
+
+
+def _free(problem: Any) -> Configuration:
+    """The configuration of the body without links."""
     if problem.inertia is None:
         return Translation(problem.dimension)
     start_mass = problem.mass if problem.actuator.burns else None

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmoc.diagnosis.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.diagnosis.relaxable import LEAST, Giving, Relaxable
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of

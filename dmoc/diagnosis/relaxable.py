@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmoc.basics.digits import down, time_unit, up
+from dmoc.diagnosis.elastic import Relaxation, Relaxed
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.elastic import Relaxation, Relaxed
 from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP

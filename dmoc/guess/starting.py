@@ -58,11 +58,17 @@ def starting_guess(
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = duration or guess_duration(problem)
-    if given is None and (best := _least_effort(problem, mesh, order, hold, duration)) is not None:
+    if (
+        given is None
+        and not problem.links
+        and (best := _least_effort(problem, mesh, order, hold, duration)) is not None
+    ):
         return best
     places = len(mesh) - 1 if hold else len(fractions)
     control, spiral = np.zeros((places, problem.controls)), False
-    if given is None:
+    if given is None and problem.links:
+        position, ends = _along_links(problem, fractions)
+    elif given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)
     else:
         position = _given_path(problem, given, duration, fractions)
@@ -84,6 +90,16 @@ def starting_guess(
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
+def _along_links(problem: TransferProblem, fractions: np.ndarray) -> tuple[np.ndarray, tuple]:
+    """A path that keeps to the links, and the velocities at its ends, 0 where they are free."""
+    from dmoc.links.along import along_links
+
+    (start, first), (goal, last) = problem.start.fixed(), problem.goal.fixed()
+    if np.isnan(start).any():
+        raise ValueError("a body on links needs a start whose position is known, or a guess of the path")
+    return along_links(problem.links, start, goal, fractions), (np.nan_to_num(first), np.nan_to_num(last))
+
+
 def _least_effort(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
 ) -> DiscretePath | None:
@@ -97,7 +113,7 @@ def _least_effort(
     more = problem.actuator.labels(problem.dimension)[problem.dimension :]
     # Shots see the conditions of the goal, not numbers that it fixes.
     other = problem.goal.anchored or np.isnan(start).any() or not np.isnan(problem.goal.fixed()).all()
-    if attractor is None or problem.constraints or other or more not in ((), ("throttle",)):
+    if attractor is None or problem.constraints or problem.links or other or more not in ((), ("throttle",)):
         return None
     if duration * problem.attraction.rates(start[0][None])[0] < 2 * np.pi * VERY_MANY_TURNS:
         return None

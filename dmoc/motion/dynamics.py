@@ -87,7 +87,7 @@ class Dynamics:
 
     @remembered_property
     def velocity(self) -> ca.Function:
-        """(t, q, p, m) -> w [m/s], [rad/s] that belongs to the momentum p = Z' dl/dv.
+        """(t, q, p, m) -> w [m/s], [rad/s] that belongs to the momentum p = Z' dl/dv, as far as links let it.
 
         Raises
         ------
@@ -102,7 +102,11 @@ class Dynamics:
             raise ValueError("an effect's lagrangian is not quadratic in the velocity; state it as a Force")
         # The momentum is linear in the velocity: inertia times velocity, plus its value at rest.
         at_rest = self.momentum(t, q, ca.DM.zeros(self.freedom), m)
-        return ca.Function("velocity", [t, q, p, m], [ca.solve(inertia, p - at_rest)])
+        free = ca.solve(inertia, p - at_rest)
+        if not self.configuration.joined:
+            return ca.Function("velocity", [t, q, p, m], [free])
+        bars = self.configuration.bars(q)
+        return ca.Function("velocity", [t, q, p, m], [free - _taken(inertia, bars, bars @ free)])
 
     @remembered_property
     def acceleration(self) -> ca.Function:
@@ -114,14 +118,25 @@ class Dynamics:
         t, q, w, m, v = self.states()
         f = ca.SX.sym("f", self.freedom)
         if self.configuration.surplus:
-            rate = self._by_euler(t, q, w, m, f)
+            rate = self._held(t, q, w, m, self._by_euler(t, q, w, m, f))
             return ca.Function("acceleration", [t, q, w, m, f], [ca.densify(rate)])
         dldq, dldv, push = self.point(t, q, v, m)
         # The Euler-Lagrange equation d/dt dl/dv = dl/dq + F/m, whose left side is written out by the chain
         # rule.
         change = ca.jacobian(dldv, q) @ v + ca.jacobian(dldv, t)
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
+        rate = self._held(t, q, v, m, rate)
         return ca.Function("acceleration", [t, q, v, m, f], [ca.densify(rate)])
+
+    def _held(self, t: Any, q: Any, w: Any, m: Any, rate: Any) -> Any:
+        """dw/dt of what would be `rate` without links: their forces are such that they do not open."""
+        body = self.configuration
+        if not body.joined:
+            return rate
+        turning = ca.jtimes(body.opening(q, w), q, body.velocity(q, w))
+        bars = body.bars(q)
+        inertia = ca.jacobian(self.momentum(t, q, w, m), w)
+        return rate - _taken(inertia, bars, bars @ rate + turning)
 
     def _by_euler(self, t: Any, q: Any, w: Any, m: Any, f: Any) -> Any:
         """dw/dt of a rigid body: Newton's equation of its centre of mass and Euler's of its rate."""
@@ -163,7 +178,7 @@ class Dynamics:
     @remembered_property
     def depends_on_velocity(self) -> bool:
         """Whether a step of order 2 is implicit: an effect looks at the velocity, or the body turns."""
-        return bool(self.configuration.surplus or split_effects(self.effects, self.configuration)[1])
+        return bool(self.configuration.conditions or split_effects(self.effects, self.configuration)[1])
 
     @remembered_property
     def depends_on_time(self) -> bool:
@@ -171,6 +186,21 @@ class Dynamics:
         t, q, v, m = self.symbols()
         lagrangian = specific_lagrangian(self.effects, self.configuration, t, q, v, m)
         return bool(ca.depends_on(ca.SX(lagrangian), t))
+
+    @remembered_property
+    def tangential(self) -> ca.Function:
+        """(t, q, m, column) -> a momentum without what the reactions of links take up."""
+        t, q, w, m, _ = self.states()
+        column, bars = ca.SX.sym("column", self.freedom), self.configuration.bars(q)
+        inertia = ca.jacobian(self.momentum(t, q, w, m), w)
+        taken = inertia @ _taken(inertia, bars, bars @ ca.solve(inertia, column))
+        return ca.Function("tangential", [t, q, m, column], [ca.densify(column - taken)])
+
+    @remembered_property
+    def bars(self) -> ca.Function:
+        """q -> C(q), the slope of the links along the independent velocities."""
+        q = ca.SX.sym("q", self.positions)
+        return ca.Function("bars", [q], [ca.densify(self.configuration.bars(q))])
 
     @remembered_property
     def to_freedom(self) -> ca.Function:
@@ -197,6 +227,12 @@ class Dynamics:
         parts.append(ca.SX(0, 1) if wheels is None else wheels)
         parts.append(ca.SX.zeros(3) if torque is None else torque)
         return ca.Function("wrench", [q, u], [ca.densify(ca.vertcat(*parts))])
+
+
+def _taken(inertia: Any, bars: Any, opening: Any) -> Any:
+    """What reactions of links take of a velocity that would open them: M^-1 C' (C M^-1 C')^-1 opening."""
+    back = ca.solve(inertia, bars.T)
+    return back @ ca.solve(bars @ back, opening)
 
 
 def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import pairwise
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -31,6 +33,7 @@ def end_momenta(
     if not dynamics.depends_on_velocity:
         return p, p.copy()
     times = start_time + path.duration * path.mesh
+    p = without_reactions(dynamics, times, path.position[ends], path.mass[ends], p)
     v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
     return p, np.array(v).T.reshape(-1, n)
 
@@ -38,6 +41,15 @@ def end_momenta(
 def along_path(dynamics: Dynamics, position: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Z(q)' of columns of the size of q, one row a place: what moves the body and not its constraint."""
     return dynamics.to_freedom(position.T, columns.T).full().T if dynamics.configuration.surplus else columns
+
+
+def without_reactions(
+    dynamics: Dynamics, times: np.ndarray, position: np.ndarray, mass: np.ndarray, momenta: np.ndarray
+) -> np.ndarray:
+    """Momenta in the independent velocities, one row a place, without what the reactions of links take up."""
+    if not dynamics.configuration.joined:
+        return momenta
+    return dynamics.tangential(times[None], position.T, mass[None], momenta.T).full().T
 
 
 def velocity_along(dynamics: Dynamics, position: np.ndarray, rates: np.ndarray) -> np.ndarray:
@@ -81,7 +93,13 @@ def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> 
     n, s, steps = dynamics.freedom, scheme(path.order).degree, len(path.mesh) - 1
     make = partial(_legendre_slopes, dynamics, path.order, path.hold)
     function = remembered(make, "legendre slopes", dynamics, path.order, path.hold)
-    slopes = np.array(function(*_given(path, start_time))).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    given = _given(path, start_time)
+    if dynamics.configuration.joined:
+        given = (*given, _impulses(dynamics, path))
+    slopes = np.array(function(*given)).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    if dynamics.configuration.joined:
+        slopes = _between_links(dynamics, path, slopes)
+        n -= dynamics.configuration.joined
     # The rows p_0 = -P_0, P_1 = .. = 0 tell how all later nodes move with q_0 and p_0.
     inner, start = slopes[:, : n * s, n:], np.zeros((steps, n * s, 2 * n))
     start[:, :, :n], start[:, :n, n:] = -slopes[:, : n * s, :n], -np.eye(n)
@@ -118,10 +136,52 @@ def _legendre_slopes(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
     if body.surplus:
         nodes = [q + given[-1] for q in ca.vertsplit(given[0], body.size)]
         along = [body.along(q, momentum) for q, momentum in zip(nodes, momenta, strict=True)]
-        slopes = ca.jacobian(ca.vertcat(*along), given[0]) @ ca.diagcat(*map(body.tangent, nodes))
+        nodes_moved: Any = ca.diagcat(*map(body.tangent, nodes))
     else:
-        slopes = ca.jacobian(ca.vertcat(*momenta), given[0])
+        nodes = [q + given[-1] for q in ca.vertsplit(given[0], body.size)]
+        along, nodes_moved = list(momenta), ca.SX.eye(given[0].numel())
+    if body.joined:
+        impulses = ca.SX.sym("impulses", body.joined * len(nodes))
+        given.append(impulses)
+        pulls = zip(nodes, ca.vertsplit(impulses, body.joined), strict=True)
+        along = [row - body.bars(q).T @ pull for row, (q, pull) in zip(along, pulls, strict=True)]
+    slopes = ca.jacobian(ca.vertcat(*along), given[0])
+    slopes = slopes @ nodes_moved if body.surplus else slopes
     return ca.Function("slopes", given, [ca.densify(slopes)])
+
+
+def _impulses(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
+    """Impulses of links per unit mass at the nodes of every step, stacked, one column a step."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    held = dynamics.configuration.joined
+    reaction = np.zeros((len(path.position), held)) if path.reaction is None else path.reaction[:, -held:]
+    weights = rule.weights[:, None] * path.duration * np.diff(path.mesh)
+    parts = reaction[step_nodes(steps, rule)] * weights[:, :, None]
+    return parts.transpose(0, 2, 1).reshape(-1, steps)
+
+
+def _between_links(dynamics: Dynamics, path: DiscretePath, slopes: np.ndarray) -> np.ndarray:
+    """Slopes of a step's momenta in an orthonormal basis of the ways in which links let each node move."""
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    bases = link_bases(dynamics, path.position)[step_nodes(steps, rule)]
+    blocks = slopes.reshape(steps, rule.degree + 1, dynamics.freedom, rule.degree + 1, dynamics.freedom)
+    found = np.einsum("ikna,kinjm,jkmb->kiajb", bases, blocks, bases, optimize=True)
+    size = (rule.degree + 1) * bases.shape[-1]
+    return found.reshape(steps, size, size)
+
+
+def link_bases(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
+    """Orthonormal bases of the velocities that links let be, shape (places, freedom, freedom - joined).
+
+    Each is turned as little as can be from the one before, so that matrices from one to the next compare.
+    """
+    held = dynamics.configuration.joined
+    bars = dynamics.bars(position.T).full().reshape(held, len(position), -1).transpose(1, 2, 0)
+    bases = np.linalg.qr(bars, mode="complete")[0][:, :, held:]
+    for before, basis in pairwise(bases):
+        left, _, right = np.linalg.svd(basis.T @ before)
+        basis[:] = basis @ (left @ right)
+    return bases
 
 
 def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:

@@ -135,7 +135,9 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
         increments = _increments(scheme, point, t, h, q, moved, m, push([q, *[q + move for move in moved]]))
         return ca.Function("step", given, increments, names, ["dq", "dp", "v"])
     first, speed = _first_guess(dynamics, scheme, h, (p, velocity, kick))
-    y = ca.SX.sym("y", n * s)
+    y = ca.SX.sym("y", n * s + body.joined * s)
+    # The impulses of links at the nodes of the step but the last, over the speeds that momenta are divided by.
+    held = ca.vertsplit(y[n * s :], body.joined) if body.joined else []
     moves = [h * speed * y[n * j : n * (j + 1)] for j in range(s)]
     nodes = [q, *[q + move for move in moves]]
     moving = dynamics.step_point(s)
@@ -143,15 +145,18 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
         scheme, lambda t, r, v, m: moving(t, r + origin, v, m), t, h, nodes, m, push(nodes), body, origin
     )
     rows = ca.Function(
-        "rows", [y, *given], [_rows(dynamics, h, p, speed, [r + origin for r in nodes], momenta)]
+        "rows", [y, *given], [_rows(dynamics, (p, speed), [r + origin for r in nodes], momenta, held)]
     )
     # Convergence is quadratic: once a Newton step is below 1e-11 the next one is below round-off. The size of
     # the rows decides nothing.
     settings = {"abstol": 1e-300, "abstolStep": 1e-11, "max_iter": 30, "error_on_fail": False}
     newton = ca.rootfinder("newton", "fast_newton", rows, settings)
     start = ca.Function("start", given, [first])
-    if body.surplus:
-        last = [moves[-1], body.along(nodes[-1] + origin, momenta[-1]) - p]
+    if body.conditions:
+        arrived = body.along(nodes[-1] + origin, momenta[-1])
+        if body.joined:
+            arrived = dynamics.tangential(t + h, nodes[-1] + origin, m[-1], arrived)
+        last = [moves[-1], arrived - p]
         increments = [*last, ca.horzcat(*step_velocities(scheme, h, nodes))]
     else:
         increments = _increments(scheme, point, t, h, q, moves, m, push(nodes))
@@ -168,9 +173,11 @@ def _first_guess(dynamics: Dynamics, scheme: Scheme, h: Any, state: tuple) -> tu
     1e-300 keeps that speed above zero for a body at rest that nothing pushes.
     """
     p, velocity, kick = state
+    links = ca.SX.zeros(dynamics.configuration.joined * scheme.degree)
     if not dynamics.configuration.surplus:
         speed = ca.sqrt(ca.dot(velocity, velocity) + ca.dot(p, p) + h**2 * ca.dot(kick, kick) + 1e-300)
-        return ca.vertcat(*[c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]), speed
+        moves = [c * (velocity + 0.5 * c * h * kick) / speed for c in scheme.points[1:]]
+        return ca.vertcat(*moves, links), speed
     places = dynamics.configuration.coordinates.places
     along = velocity * ca.DM(places.astype(float))
     linear = ca.sqrt(ca.dot(along, along) + 1e-300)
@@ -178,18 +185,26 @@ def _first_guess(dynamics: Dynamics, scheme: Scheme, h: Any, state: tuple) -> tu
     speed = ca.vertcat(
         *[linear + ca.norm_2(h * kick * ca.DM(places.astype(float))) if place else 1 / h for place in places]
     )
-    return ca.vertcat(*[c * velocity / speed for c in scheme.points[1:]]), speed
+    return ca.vertcat(*[c * velocity / speed for c in scheme.points[1:]], links), speed
 
 
-def _rows(dynamics: Dynamics, h: Any, p: Any, speed: Any, nodes: Sequence, momenta: Sequence) -> Any:
-    """The equations of one step: Z' P_0 + p = 0 and, at the later nodes but the last, Z' P_j = 0; and g = 0."""
-    body = dynamics.configuration
-    if not body.surplus:
+def _rows(dynamics: Dynamics, start: tuple, nodes: Sequence, momenta: Sequence, held: Sequence) -> Any:
+    """The equations of one step: Z' P_0 + p = 0 and, at the later nodes but the last, Z' P_j = 0; and g = 0.
+
+    `start` is p and the speed that the rows of a point mass are divided by, `held` the impulses of links at the
+    nodes but the last, which act along the slopes of g.
+    """
+    body, (p, speed) = dynamics.configuration, start
+    if not body.conditions:
         return ca.vertcat(momenta[0] + p, *momenta[1:-1]) / speed
     # Momenta of places are divided by their speed; those of attitudes need no scale for Newton's method.
-    first = body.along(nodes[0], momenta[0]) + p
-    inner = [body.along(q, momentum) for q, momentum in zip(nodes[1:-1], momenta[1:-1], strict=True)]
-    return ca.vertcat(first, *inner, *[body.g(q) for q in nodes[1:]])
+    rows = [body.along(q, momentum) for q, momentum in zip(nodes[:-1], momenta[:-1], strict=True)]
+    rows[0] = rows[0] + p
+    if not body.surplus:
+        rows = [row / speed for row in rows]
+    if body.joined:
+        rows = [row - body.bars(q).T @ impulse for row, q, impulse in zip(rows, nodes, held, strict=False)]
+    return ca.vertcat(*rows, *[body.g(q) for q in nodes[1:]])
 
 
 def _increments(scheme: Scheme, point, t, h, q, moves: Sequence, m: Sequence, push: Sequence) -> list:

@@ -32,7 +32,7 @@ class Owner(NamedTuple):
     def of(self, problem: Any) -> Any:
         """The part itself."""
         part = getattr(problem, self.field)
-        return part[self.entry] if self.field == "constraints" else part
+        return part[self.entry] if self.field in ("constraints", "links") else part
 
 
 class Limit(NamedTuple):

@@ -69,10 +69,11 @@ class Placement:
         sizes = np.array([[units.torque if unit == "N m" else units.force for unit in actuator.units(n)]])
         controls = self.steps if self.hold else nodes
         columns = columns.add("force", "control", actuator.labels(n), controls, sizes)
-        if body.surplus:
-            # The force of the constraint on a quaternion is a torque per unit mass.
-            reactions = units.torque / problem.mass
-            columns = columns.add("reaction", "node", [str(i) for i in range(body.surplus)], nodes, reactions)
+        if body.conditions:
+            # The force of the constraint on a quaternion is a torque per unit mass, that of a link a force.
+            reactions = np.repeat([units.torque, units.force], [body.surplus, body.joined])[None] / problem.mass
+            labels = [str(i) for i in range(body.conditions)]
+            columns = columns.add("reaction", "node", labels, nodes, reactions)
         if problem.actuator.burns:
             columns = columns.add("mass", "node", ("",), nodes, units.mass)
         columns = columns.add("start.velocity", "end", body.velocity_names, 1, speeds)

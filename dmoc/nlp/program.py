@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.configurations.coordinates import Coordinates
@@ -52,7 +53,7 @@ class Program:
 
         same = {
             "dimension": problem.dimension == old.dimension,
-            "inertia": configuration_of(problem) == self.dynamics.configuration,
+            "inertia or links": configuration_of(problem) == self.dynamics.configuration,
             "effects": each(_equal, problem.effects, old.effects),
             "actuator": _built_alike(problem.actuator, old.actuator),
             "objective": _equal(problem.objective, old.objective),
@@ -113,6 +114,9 @@ class Program:
                 if group.name == CONSTRAINT:
                     met = group.indices[~_open(self.dynamics, position), place]
                     low[met], high[met] = -np.inf, np.inf
+                elif group.owner and group.owner.field == "links" and group.kind == "node":
+                    if not _looks_at(group.owner.of(problem), self.dynamics, np.isnan(position)):
+                        low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 elif group.kind == "node" and not np.isnan(position).any():
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 if group.owner and group.owner.end == end and not np.isnan(velocity).any():
@@ -139,7 +143,9 @@ class Program:
             "start.velocity": path.start_velocity,
             "goal.velocity": path.goal_velocity,
             "duration": path.duration,
-            "reaction": np.zeros(len(path.position)) if path.reaction is None else path.reaction,
+            "reaction": np.zeros(self.columns["reaction"].scales.shape if "reaction" in self.columns else 0)
+            if path.reaction is None
+            else path.reaction,
         }
         return self.scaled(values, np.ravel, np.concatenate)
 
@@ -237,6 +243,13 @@ def _equal(new: Any, old: Any) -> bool:
 def _open(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
     """Which entries of the constraint g look at an entry of a boundary position that is free (NaN)."""
     return np.array([np.isnan(position[at]).any() for at in dynamics.configuration.coordinates.quaternions])
+
+
+def _looks_at(link: Any, dynamics: Dynamics, free: np.ndarray) -> bool:
+    """Whether a link looks at a coordinate of a boundary position that is free."""
+    q = ca.SX.sym("q", len(free))
+    place = dynamics.configuration.body(q, ca.SX.zeros(len(free))).position
+    return any(ca.which_depends(ca.SX(link.g(place)), q[i], 1, True)[0] for i in np.flatnonzero(free))
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:

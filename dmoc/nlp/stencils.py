@@ -9,26 +9,23 @@ serves every mesh, and every problem of the same structure.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.configurations.of_problem import configuration_of
-from dmoc.guess.chart import drafted
+from dmoc.configurations.of_problem import configuration_of, link_sizes
 from dmoc.motion.dynamics import Dynamics, actuation, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
-from dmoc.nlp.assembly import kernel
-from dmoc.nlp.layout import CONSTRAINT, Limit, Owner, Stencil, Stencils
+from dmoc.nlp.draft import ALL, Draft
+from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
 from dmoc.parts.rows import Row, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
-# A stencil takes all entries of a group, one for each evaluation.
-ALL = slice(None)
 # A stencil takes the first entry of a group: that of the start.
 FIRST = slice(0, 1)
 # A stencil takes the last entry of a group: that of the goal.
@@ -72,7 +69,7 @@ class _Writer:
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
-        draft, n, body = _Draft(self), self.dynamics.positions, self.dynamics.configuration
+        draft, n, body = Draft(self), self.dynamics.positions, self.dynamics.configuration
         r, frame = draft.place()
         u = None if self.hold else draft.control(frame)
         m, duration = draft.mass(ALL), draft.duration()
@@ -82,12 +79,13 @@ class _Writer:
         resting, _ = split_effects(self.problem.effects, body)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
         push = push if u is None else push + actuation(body, self.actuator, q, u) / m
-        if body.surplus:
-            push = push - body.pull(q, draft.take("reaction", body.surplus))
+        if body.conditions:
+            push = push - body.pull(q, draft.take("reaction", body.conditions))
         draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)))
         if body.surplus:
-            rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q)))]
+            rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q))[: body.surplus])]
             draft.limit(CONSTRAINT, "node", rows)
+        self._links(draft, "", body.links_at(q))
         for i, constraint in enumerate(self.constraints):
             rows = constraint.rows_of(t, body.body(q, ca.DM.zeros(n)), u, m)
             draft.limit(title(constraint, i), "node", rows, Owner("constraints", i))
@@ -100,7 +98,7 @@ class _Writer:
     def step(self) -> Stencil:
         """Momenta of one step; cost and limits that look at its velocities or at a held control."""
         rule, problem = self.rule, self.problem
-        draft, size = _Draft(self), self.dynamics.controls
+        draft, size = Draft(self), self.dynamics.controls
         # nodes[j] picks the j-th node of every step out of all steps * s + 1 nodes.
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
         r, frames = map(list, zip(*(draft.place(at) for at in nodes), strict=True))
@@ -171,7 +169,7 @@ class _Writer:
             found.append(body.velocity(at, self.dynamics.velocity(t, at, p, m)))
         return tuple(found)
 
-    def _burn(self, draft: _Draft, h: Any, m: list, flow: list) -> None:
+    def _burn(self, draft: Draft, h: Any, m: list, flow: list) -> None:
         """Node masses by the Lobatto IIIA matrix A: m_i = m_0 - h sum_j A_ij flow_j, s rows a step.
 
         The last row of A is the weights, so the mass used equals the quadrature of the flow exactly.
@@ -186,7 +184,7 @@ class _Writer:
 
     def ends(self) -> Stencil:
         """Momenta of the boundary states, conditions on them and the cost of the goal."""
-        draft, body = _Draft(self), self.dynamics.configuration
+        draft, body = Draft(self), self.dynamics.configuration
         (first, before), (last, after) = (draft.place(at) for at in (FIRST, LAST))
         first, last = first + self.origin, last + self.origin
         v = {end: draft.velocity(end, frame) for end, frame in (("start", before), ("goal", after))}
@@ -198,6 +196,8 @@ class _Writer:
         for name, frame, at in (("start", before.T, FIRST), ("goal", -after.T, LAST)):
             t, q, w, m = states[name]
             draft.add("dynamics", frame @ self.dynamics.point(t, q, body.velocity(q, w), m)[1], at)
+        for end in ("start", "goal"):
+            self._links(draft, end, body.opening(states[end][1], states[end][2]))
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
             _, q, w, _ = states[end]
@@ -210,6 +210,18 @@ class _Writer:
         seen = self._seen((t, q, body.velocity(q, w), m))
         draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*seen))
         return draft.stencil("ends")
+
+    def _links(self, draft: Draft, end: str, rows: Any) -> None:
+        """Rows that keep the links together at a node or, of velocities, at one end; link by link."""
+        counts = np.cumsum([0, *link_sizes(self.problem)])
+        for i, link in enumerate(self.problem.links):
+            unit = (link.unit if link.unit == "m" else "") + "/s" * bool(end and link.unit == "m")
+            mine = [
+                Row(str(k), rows[int(at)], 0.0, 0.0, unit)
+                for k, at in enumerate(range(counts[i], counts[i + 1]))
+            ]
+            name = f"{end}.{title(link, i)}" if end else title(link, i)
+            draft.limit(name, "end" if end else "node", mine, Owner("links", i, end))
 
     def _rate(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         t, q, v, m = self._seen((t, q, v, m))
@@ -227,74 +239,3 @@ class _Writer:
         v, u = ca.SX.sym("v", n), ca.SX.sym("u", self.dynamics.controls)
         rate = ca.SX(self._rate(ca.SX.sym("t"), ca.SX.sym("q", n), v, u, ca.SX.sym("m")))
         return ca.depends_on(rate, v) or (self.hold and ca.depends_on(rate, u))
-
-
-class _Draft:
-    """The unknowns, numbers and rows of one stencil while it is being written down."""
-
-    def __init__(self, writer: _Writer):
-        self.writer, self.cost = writer, ca.SX(0)
-        self._symbols: list[ca.SX] = []
-        self._unknowns: list[tuple[str, slice]] = []
-        self._data: list[ca.SX] = []
-        self._numbers: list[tuple[str, slice]] = []
-        self._rows: list[ca.SX] = []
-        self._targets: list[tuple[str, slice]] = []
-        self._limits: list[Limit] = []
-
-    def take(self, group: str, size: int, at: slice = ALL) -> ca.SX:
-        """Symbols for some of the unknowns of a group."""
-        self._symbols.append(ca.SX.sym(group, size))
-        self._unknowns.append((group, at))
-        return self._symbols[-1]
-
-    def place(self, at: slice = ALL) -> tuple[Any, Any]:
-        """The position of a node from the origin, and the frame that forces and rows of motion have there."""
-        n = self.writer.dynamics.positions
-        unknowns = self.take("position", n, at)
-        if not self.writer.curved:
-            return unknowns, ca.DM.eye(n)
-        return drafted(lambda name: self.number(name, at), unknowns)
-
-    def control(self, frame: Any, at: slice = ALL) -> ca.SX:
-        """The controls of a node, whose force is in the frame there."""
-        u, n = self.take("force", self.writer.dynamics.controls, at), self.writer.dynamics.positions
-        return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved else u
-
-    def velocity(self, end: str, frame: Any) -> ca.SX:
-        """The velocity at one end, which is in the frame there."""
-        v = self.take(f"{end}.velocity", self.writer.dynamics.freedom)
-        return frame @ v if self.writer.curved else v
-
-    def number(self, name: str, at: slice = ALL) -> ca.SX:
-        """A symbol for a number that the mesh, or the chart, gives to each evaluation."""
-        self._data.append(ca.SX.sym(name))
-        self._numbers.append((name, at))
-        return self._data[-1]
-
-    def mass(self, at: slice) -> ca.SX:
-        """The mass at nodes: unknowns if it burns away, a parameter if not."""
-        return self.take("mass", 1, at) if self.writer.problem.actuator.burns else self.writer.mass
-
-    def duration(self) -> ca.SX:
-        """The duration: an unknown if it is free, a parameter if not."""
-        return self.take("duration", 1) if self.writer.problem.free_duration else self.writer.duration
-
-    def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:
-        """Add to rows of a group that others also add to."""
-        self._rows.append(rows)
-        self._targets.append((group, at))
-
-    def limit(self, name: str, kind: str, rows: Sequence[Row], owner: Owner | None = None) -> None:
-        """Rows of this stencil alone."""
-        if rows:
-            # The expressions are in the kernel; the layout needs only names, bounds and units.
-            bare = tuple(row._replace(expression=None) for row in rows)
-            self._limits.append(Limit(name, kind, bare, owner))
-            self.add(name, ca.vertcat(*[row.expression for row in rows]))
-
-    def stencil(self, every: str) -> Stencil:
-        given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.writer.parameters
-        made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
-        places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)
-        return Stencil(made, every, *places, tuple(self._limits))

@@ -140,7 +140,7 @@ def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
         goal,
         {Key.parse(str(table[name][2]["key"])): as_array(table, name) for name in groups},
         made,
-        as_array(table, "reaction") if made else None,
+        as_array(table, "reaction") if "reaction" in table else None,
     )
 
 

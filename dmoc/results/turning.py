@@ -24,15 +24,18 @@ def turning_variables(solution: Any, at: str, between: str) -> dict[str, tuple]:
     `at` is the dimension along which controls stand, `between` says what they are between nodes.
     """
     path, made = solution.path, solution.path.coordinates
+    words = "constraint force per unit mass"
+    held: dict[str, tuple] = {}
+    if path.reaction is not None:
+        held["reaction"] = (("node", "constraint"), path.reaction, "m2/s2" if made.turns else "m/s2", words)
     if not made.turns:
-        return {}
+        return held
     ends = {"start": path.start_velocity, "goal": path.goal_velocity}
-    found: dict[str, tuple] = {
+    found = held | {
         "attitude": (("node", "quaternion"), solution.attitude, "1", "unit quaternion, body to space"),
         "rate": (("end", "body_axis"), solution.rate, "rad/s", "angular rate in body axes"),
         "spin": (("end", "body_axis"), solution.spin, "m2/s", "angular momentum per unit mass, body axes"),
         "torque": ((at, "body_axis"), solution.torque, "N m", f"torque in body axes{between}"),
-        "reaction": (("node", "constraint"), path.reaction, "m2/s2", "constraint force per unit mass"),
     }
     for end, moving in ends.items():
         found[f"{end}_rate"] = (("body_axis",), moving[made.rates], "rad/s", f"rate at the {end}")

@@ -7,20 +7,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.effects.base import Conservative, Effect
-from dmoc.effects.user_functions import evaluated
+from dmoc.effects.base import Effect
+from dmoc.links.holonomic import Holonomic
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
-from dmoc.parts.rows import Row
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.ends import Boundary
-from dmoc.scene.inertia import check_acts_on, check_body_effect, turning_checked
+from dmoc.scene.fits import check_acts_on, check_functions, check_links, turning_checked
 from dmoc.scene.wheels import with_wheels
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
@@ -57,6 +55,8 @@ class TransferProblem:
     inertia : 3 floats or 3x3 floats, optional
         Inertia of the body in body axes about its centre of mass [kg m^2], principal moments or a matrix: with
         it the body turns, and its ends are `Pose` or, for the attitude alone, `Attitude`.
+    links : sequence of Holonomic
+        Rods, rails and surfaces that hold the body.
     name, parameters
         Provenance, set when the problem is loaded from a file.
 
@@ -77,6 +77,7 @@ class TransferProblem:
     guess: Any = None
     start_time: float = 0.0
     inertia: Any = None
+    links: Sequence[Holonomic] = ()
     name: str = field(default="problem", compare=False)
     parameters: dict = field(default_factory=dict, compare=False)
 
@@ -88,6 +89,7 @@ class TransferProblem:
             start_time=number("start_time", self.start_time, "s"),
             effects=_parts("effects", self.effects, Effect),
             constraints=_parts("constraints", self.constraints, Constraint),
+            links=_parts("links", self.links, Holonomic),
         )
         for name, kind in (
             ("start", Boundary),
@@ -107,13 +109,16 @@ class TransferProblem:
                 f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
             )
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
+        for link in self.links:
+            link.check_dimension(self.dimension)
         for part in parts:
             part.check_dimension(self.dimension)
             check_acts_on(part, self.inertia is not None, self.start.has_position)
         self._check_clock()
-        _check_functions(self)
+        check_functions(self)
         self._check_objective()
         self._check_ends()
+        check_links(self)
         if self.actuator.dry_mass >= self.mass:
             raise ValueError(
                 f"the actuator's dry_mass must be less than the mass; got {self.actuator.dry_mass:g} "
@@ -227,43 +232,6 @@ class TransferProblem:
                 "least time without a force limit has no optimum (the duration goes to 0 s); "
                 "use BoxForce(limit) or BallForce(limit)"
             )
-
-
-def _check_functions(problem: TransferProblem) -> None:
-    """Raise ValueError if a method of a user's own part gives another number of values than it must."""
-    n, actuator = problem.dimension, problem.actuator
-    t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
-    u = ca.SX.sym("u", problem.controls)
-    functions: list[tuple[Any, str, list, int]] = [(actuator, "force", [u], n)]
-    for effect in problem.effects:
-        if effect.turns_body:
-            if _is_users(effect):
-                check_body_effect(effect, problem.inertia)
-            continue
-        single = isinstance(effect, Conservative)
-        functions.append((effect, "lagrangian" if single else "force", [t, q, v, m], 1 if single else n))
-    for _, term in problem.objective.terms:
-        functions += [(term, "running", [t, q, v, u, m], 1), (term, "terminal", [t, q, v, m], 1)]
-    for part, name, given, needed in functions:
-        if _is_users(part):
-            words, method = f"{type(part).__name__}.{name}", getattr(part, name)
-            found = evaluated(words, method, given, "write it with casadi's functions").numel()
-            if found != needed:
-                raise ValueError(f"{words} must give {needed} values in {n} dimensions; it gives {found}")
-    limits: list[tuple[Any, str, list]] = [(actuator, "rows", [u])]
-    for constraint in problem.constraints:
-        limits += [(constraint, "rows", [t, q, u, m]), (constraint, "speed_rows", [v])]
-    for part, name, given in limits:
-        rows = getattr(part, name)(*given) if _is_users(part) else []
-        if not isinstance(rows, (list, tuple)) or not all(isinstance(row, Row) for row in rows):
-            raise ValueError(
-                f"{type(part).__name__}.{name} must give a list of dmoc.Row; it gives {short(rows)}"
-            )
-
-
-def _is_users(part: Any) -> bool:
-    """Whether the class of a part is defined outside dmoc, where no test of dmoc has looked at it."""
-    return not type(part).__module__.startswith("dmoc.")
 
 
 def _duration(value: Any) -> float | tuple[float, float]:

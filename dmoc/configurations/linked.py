@@ -1,0 +1,100 @@
+"""A configuration that links hold: fewer ways to move than velocities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+
+from dmoc.configurations.base import Configuration
+from dmoc.configurations.coordinates import Coordinates
+from dmoc.effects.base import Body
+
+
+@dataclass(frozen=True)
+class Linked(Configuration):
+    """The configuration `free` of bodies, held by links.
+
+    Velocities stay those of the free bodies, and dg/dq Z w = 0 holds for them: what a user sees of a bob on a
+    rod is its velocity in space. The reactions of the links are unknowns of the NLP and of a step beside those
+    of unit quaternions, so that no tangent matrix of the links is needed there; where one is (rows that are
+    reported, matrices of a step) it is an orthonormal basis of the null space, found place by place.
+
+    References
+    ----------
+    S. Leyendecker, S. Ober-Bloebaum, J. E. Marsden, M. Ortiz, Discrete mechanics and optimal control
+    for constrained systems, Optim. Control Appl. Meth. 31 (2010).
+    """
+
+    free: Configuration
+    links: tuple[Any, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.free.names
+
+    @property
+    def velocity_names(self) -> tuple[str, ...]:
+        return self.free.velocity_names
+
+    @property
+    def coordinates(self) -> Coordinates:
+        return self.free.coordinates
+
+    @property
+    def dimension(self) -> int:
+        return self.free.dimension
+
+    @property
+    def joined(self) -> int:
+        return self._links.numel_out(0)
+
+    def kinetic(self, q: Any, v: Any, m: Any) -> Any:
+        return self.free.kinetic(q, v, m)
+
+    def inertia(self, q: Any, v: Any, m: Any) -> tuple[Any, Any]:
+        return self.free.inertia(q, v, m)
+
+    def step_inertia(self, h: Any, q: Sequence, move: Any, m: Any) -> list:
+        return self.free.step_inertia(h, q, move, m)
+
+    @cached_property
+    def _links(self) -> ca.Function:
+        """q -> g of the links, and its slope."""
+        q = ca.SX.sym("q", self.size)
+        place = self.free.body(q, ca.SX.zeros(self.size)).position
+        g = ca.vertcat(*[link.g(place) for link in self.links])
+        return ca.Function("links", [q], [ca.densify(g), ca.jacobian(g, q)])
+
+    def links_at(self, q: Any) -> Any:
+        return self._links(q)[0]
+
+    def opening(self, q: Any, w: Any) -> Any:
+        return self._links(q)[1] @ self.velocity(q, w)
+
+    def bars(self, q: Any) -> Any:
+        slope = self._links(q)[1]
+        return slope @ self.tangent(q) if self.surplus else slope
+
+    def g(self, q: Any) -> Any:
+        return ca.vertcat(self.free.g(q), self.links_at(q))
+
+    def pull(self, q: Any, reaction: Any) -> Any:
+        own = self.free.surplus
+        held = self._links(q)[1].T @ reaction[own:]
+        return held + self.free.pull(q, reaction[:own]) if own else held
+
+    def tangent(self, q: Any) -> Any:
+        return self.free.tangent(q)
+
+    def body(self, q: Any, v: Any) -> Body:
+        return self.free.body(q, v)
+
+    def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
+        return self.free.generalised(q, force, torque, spun)
+
+    def rotation(self, q: Any) -> Any:
+        return self.free.rotation(q)

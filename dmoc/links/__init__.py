@@ -1,0 +1,1 @@
+"""What holds bodies on rods, rails and surfaces, and to each other."""

@@ -1,0 +1,41 @@
+"""Links: holonomic constraints g(q) = 0 on where a body may be."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+from dmoc.effects.base import Part
+
+
+class Holonomic(Part, ABC):
+    """A link that holds a body: it stays where g(q) = 0.
+
+    A frozen dataclass that derives from this has one duty, `g`. The force of the link is found with the path,
+    as `solution.reaction`, and does no work.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Wire(Holonomic):
+    ...     steepness: float
+    ...     def g(self, q):
+    ...         return q[1] - self.steepness * q[0] ** 2
+    """
+
+    # The unit of g: the force of the link is then per unit of it.
+    unit: ClassVar[str] = "m"
+
+    @abstractmethod
+    def g(self, q: Any) -> Any:
+        """What the link keeps at zero [`unit`], one entry or a column, for a CasADi position q [m].
+
+        Its slope in q must not vanish where g is zero: |q| - 1, or (|q|^2 - 1) / 2, but never (|q| - 1)^2.
+        """
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the link has no meaning in this many dimensions."""
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
+        return value, unit or "-"
