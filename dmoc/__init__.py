@@ -58,6 +58,15 @@ if TYPE_CHECKING:
     from dmoc.effects.bodies import PlateDrag as PlateDrag
     from dmoc.effects.bodies import PlateRadiation as PlateRadiation
     from dmoc.effects.bodies import Plates as Plates
+    from dmoc.ends.base import Boundary as Boundary
+    from dmoc.ends.base import State as State
+    from dmoc.ends.conditions import Condition as Condition
+    from dmoc.ends.moving import Moving as Moving
+    from dmoc.ends.orbits import CircularOrbit as CircularOrbit
+    from dmoc.ends.orbits import Orbit as Orbit
+    from dmoc.ends.poses import Attitude as Attitude
+    from dmoc.ends.poses import Pose as Pose
+    from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.rods import Rod as Rod
@@ -90,15 +99,6 @@ if TYPE_CHECKING:
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.results.solution import load as load
-    from dmoc.scene.conditions import Condition as Condition
-    from dmoc.scene.ends import Boundary as Boundary
-    from dmoc.scene.ends import State as State
-    from dmoc.scene.moving import Moving as Moving
-    from dmoc.scene.orbits import CircularOrbit as CircularOrbit
-    from dmoc.scene.orbits import Orbit as Orbit
-    from dmoc.scene.poses import Attitude as Attitude
-    from dmoc.scene.poses import Pose as Pose
-    from dmoc.scene.poses import rotation as rotation
     from dmoc.scene.problem import TransferProblem as TransferProblem
     from dmoc.solver.solve import solve as solve
     from dmoc.studies.accuracy import Formulation as Formulation

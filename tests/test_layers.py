@@ -18,6 +18,7 @@ LAYERS = [
     ["configurations"],
     ["parts"],
     ["bodies", "links"],
+    ["ends"],
     ["scene"],
     ["motion"],
     ["guess", "results"],

@@ -1,4 +1,4 @@
-"""Balances of a path: momentum and spin against impulses, energy against work."""
+"""Balances of a path: momentum and spin against impulses, energy against work; and how its errors grow."""
 
 from __future__ import annotations
 
@@ -89,3 +89,18 @@ def energy_gap(evidence: Evidence) -> float | None:
         work = np.sum(evidence.force * moves, axis=1) / middle
         parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
     return float(abs(change - parts.sum()) / max(evidence.kinetic, np.abs(parts).sum()))
+
+
+def amplification(matrices: np.ndarray) -> float:
+    """How much a small error can grow, at most, from the start to any step or from any step to the goal."""
+    since_start = np.empty_like(matrices)
+    # The map from the k-th step to the goal is the whole product times the inverse of the map up to that step.
+    product = np.eye(matrices.shape[1])
+    for k, matrix in enumerate(matrices):
+        product = since_start[k] = matrix @ product
+    try:
+        to_goal = product @ np.linalg.inv(since_start)
+    except np.linalg.LinAlgError:
+        to_goal = since_start
+    sizes = np.sqrt(np.square([since_start, to_goal]).sum(axis=(2, 3)))
+    return float(np.nan_to_num(sizes.max(), nan=np.inf))

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, of_kind, short
 from dmoc.basics.digits import lasting
-from dmoc.checks.balances import balance, energy_gap
+from dmoc.checks.balances import amplification, balance, energy_gap
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
@@ -179,7 +179,7 @@ def _rollout(evidence: Evidence) -> Check:
     slip = p - evidence.momentum
     sizes = evidence.sizes
     off = np.abs(np.concatenate([miss, slip], axis=1)).max(axis=0)
-    growth = _amplification(evidence.matrices * evidence.in_size)
+    growth = amplification(evidence.matrices * evidence.in_size)
     turned = ROUNDING * evidence.acceleration * evidence.path.duration
     floor = (
         evidence.rounding / evidence.extent + (evidence.rounding / evidence.shortest + turned) / evidence.speed
@@ -198,21 +198,6 @@ def _misses(evidence: Evidence, off: np.ndarray) -> str:
     if evidence.rates.any():
         parts.append(f"{np.degrees(np.linalg.norm(moved[evidence.rates])):.2g} degrees")
     return ", ".join(parts)
-
-
-def _amplification(matrices: np.ndarray) -> float:
-    """How much a small error can grow, at most, from the start to any step or from any step to the goal."""
-    since_start = np.empty_like(matrices)
-    # The map from the k-th step to the goal is the whole product times the inverse of the map up to that step.
-    product = np.eye(matrices.shape[1])
-    for k, matrix in enumerate(matrices):
-        product = since_start[k] = matrix @ product
-    try:
-        to_goal = product @ np.linalg.inv(since_start)
-    except np.linalg.LinAlgError:
-        to_goal = since_start
-    sizes = np.sqrt(np.square([since_start, to_goal]).sum(axis=(2, 3)))
-    return float(np.nan_to_num(sizes.max(), nan=np.inf))
 
 
 def _reference(evidence: Evidence) -> Check:

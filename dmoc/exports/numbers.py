@@ -12,10 +12,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.docstrings import documented
+from dmoc.ends.base import Boundary
 from dmoc.exports.terms import Term
 from dmoc.nlp.solving import NLP
 from dmoc.parts.rows import title
-from dmoc.scene.ends import Boundary
 from dmoc.scene.problem import TransferProblem
 
 # How a bound or parameter depends on a number is found by evaluating it at this value [in the number's SI

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from dmoc.effects.base import Attractor
+from dmoc.ends.base import Boundary
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import MOST_BENT, Spiral
 from dmoc.guess.winding import Winding
-from dmoc.scene.ends import Boundary
 from dmoc.scene.problem import TransferProblem
 
 # A spiral to an open orbit is made this many times: the place where it arrives is put onto that orbit and is

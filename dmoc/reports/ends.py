@@ -10,9 +10,9 @@ from dmoc.basics.digits import lasting
 if TYPE_CHECKING:
     import numpy as np
 
+    from dmoc.ends.base import Boundary
     from dmoc.motion.march import Trajectory
     from dmoc.results.solution import Solution
-    from dmoc.scene.ends import Boundary
     from dmoc.scene.problem import TransferProblem
 
 

@@ -11,8 +11,8 @@ from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import AXES, QUATERNION, rotation_of
 from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
+from dmoc.ends.base import Boundary
 from dmoc.parts.rows import Row
-from dmoc.scene.ends import Boundary
 
 # A boundary state may be off a link by this part of its position, and leave it at this part of its speed [-]:
 # numbers that were written with ten digits are taken as meant.

@@ -11,15 +11,15 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Effect
+from dmoc.ends.base import Boundary
+from dmoc.ends.wheels import with_wheels
 from dmoc.links.holonomic import Holonomic
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
-from dmoc.scene.ends import Boundary
 from dmoc.scene.fits import check_acts_on, check_functions, check_links, turning_checked
-from dmoc.scene.wheels import with_wheels
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.

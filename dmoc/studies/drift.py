@@ -11,11 +11,11 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, number, of_kind, whole
 from dmoc.effects.gravity import PointGravity
+from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.reference import coefficients
 from dmoc.motion.step import step_map, weighted
-from dmoc.scene.ends import State
 from dmoc.scene.problem import TransferProblem
 
 # The name of the integrator that chooses its steps itself.

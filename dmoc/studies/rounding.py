@@ -9,9 +9,9 @@ import numpy as np
 
 from dmoc.basics.arguments import number
 from dmoc.effects.gravity import PointGravity, Spring
+from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import simulate
-from dmoc.scene.ends import State
 from dmoc.scene.problem import TransferProblem
 from dmoc.studies.drift import step_function
 

@@ -14,8 +14,8 @@ from dmoc.basics.arguments import number, of_kind, whole
 from dmoc.basics.quaternions import rotated
 from dmoc.bodies.torques import Torque
 from dmoc.effects.bodies import PivotGravity
+from dmoc.ends.poses import Attitude, rotation
 from dmoc.motion.dynamics import Dynamics
-from dmoc.scene.poses import Attitude, rotation
 from dmoc.scene.problem import TransferProblem
 from dmoc.studies.drift import step_function
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short
 from dmoc.effects.user_functions import as_column, tried
+from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
-from dmoc.scene.ends import Boundary, State
 
 
 @dataclass(frozen=True)

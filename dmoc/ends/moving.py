@@ -13,8 +13,8 @@ import numpy as np
 from dmoc.basics.arguments import short
 from dmoc.basics.quaternions import AXES, QUATERNION, columns_of
 from dmoc.effects.user_functions import as_column, tried
+from dmoc.ends.base import Boundary
 from dmoc.parts.rows import Row
-from dmoc.scene.ends import Boundary
 
 # The remedy that is told where a function of time given to `Moving` cannot be used.
 OF_TIME = "it must take a CasADi time [s] and give {} numbers: write it with casadi's functions"

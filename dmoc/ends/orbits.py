@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, flag, number, vector
+from dmoc.ends.base import Boundary
+from dmoc.ends.elements import ELEMENTS, element_rows, nearest_state, plane_elements
 from dmoc.parts.rows import Row
-from dmoc.scene.elements import ELEMENTS, element_rows, nearest_state, plane_elements
-from dmoc.scene.ends import Boundary
 
 
 class _Around(Boundary):

@@ -10,9 +10,9 @@ import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
 from dmoc.bodies.wheels import MomentumLimit
+from dmoc.ends.base import Boundary
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
-from dmoc.scene.ends import Boundary
 
 
 @dataclass(frozen=True)

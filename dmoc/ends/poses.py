@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import FreeVector, Vector, checked, entries, flag, number, short, vector
 from dmoc.basics.quaternions import AXES, QUATERNION, rotation_vectors
-from dmoc.scene.ends import Boundary, State
+from dmoc.ends.base import Boundary, State
 
 # A quaternion may be longer or shorter than 1 by this part before it is refused [-]: numbers that were written
 # with four digits are made unit quaternions, others are probably no attitudes.

@@ -1,0 +1,1 @@
+"""Where a transfer starts and ends."""
