@@ -69,9 +69,14 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
     from dmoc.links.holonomic import Holonomic as Holonomic
+    from dmoc.links.push import JointTorque as JointTorque
+    from dmoc.links.push import On as On
+    from dmoc.links.push import Several as Several
     from dmoc.links.rods import Rod as Rod
     from dmoc.links.rods import Slider as Slider
     from dmoc.links.rods import Surface as Surface
+    from dmoc.links.system import Member as Member
+    from dmoc.links.system import System as System
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate
     from dmoc.nlp.solving import NLP as NLP

@@ -19,7 +19,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 ROOTS = {"Constraint", "Actuator", "Objective", "Boundary", "Effect", "Conservative", "Force"}
-HOMES = {"scene", "effects", "parts"}
+HOMES = {"scene", "ends", "effects", "parts"}
 FUNCTION = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 

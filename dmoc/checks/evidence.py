@@ -158,6 +158,16 @@ class Evidence:
         opening = rate(self.position[self.ends].T, velocity.T).full()
         return np.abs(gap).max(axis=0) / self.extent, np.abs(opening).max(axis=0) / self.speed
 
+    @cached_property
+    def link_turn(self) -> float:
+        """The largest angle by which the direction of a link turns between two nodes [rad]."""
+        held = self.dynamics.configuration.joined
+        if not held:
+            return 0.0
+        bars = self.dynamics.bars(self.position.T).full().reshape(held, len(self.position), -1)
+        bars = bars / np.linalg.norm(bars, axis=2, keepdims=True)
+        return float(np.arccos(np.clip(np.sum(bars[:, 1:] * bars[:, :-1], axis=2).min(), -1.0, 1.0)))
+
     # The checks judge those numbers by the scales that follow.
 
     @cached_property

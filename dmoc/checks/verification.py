@@ -270,7 +270,8 @@ def _stability(evidence: Evidence) -> Check:
         evidence.dynamics, evidence.path, evidence.begin, evidence.velocity, evidence.matrices
     )
     note = f"h omega = {growth.frequency:.2g} at most"
-    turned = evidence.path.largest_turn
+    # A body that turns too far between two nodes, or leaps through the anchor of a rod, is none of the motion.
+    turned = max(evidence.path.largest_turn, evidence.link_turn)
     if turned >= TURN_MOST:
         note = f"{note}; more than {np.degrees(TURN_MOST):.0f} degrees turned between two nodes"
         return Check("stability", np.degrees(turned), np.degrees(TURN_MOST), "degrees a node", False, note)

@@ -90,6 +90,11 @@ class Configuration(ABC):
         """Number of entries of the constraint g: first those of unit quaternions, then those of links."""
         return self.surplus + self.joined
 
+    @property
+    def plain(self) -> bool:
+        """Whether momenta are the velocities of free coordinates: those of one point mass without links."""
+        return False
+
     def links_at(self, q: Any) -> Any:
         """The entries of g that belong to links."""
         return ca.SX.zeros(0)
@@ -145,6 +150,14 @@ class Configuration(ABC):
     def body(self, q: Any, v: Any) -> Body:
         """The body as effects see it."""
 
+    def members(self, q: Any, v: Any, m: Any) -> list[tuple[str, Body, Any]]:
+        """Name, state and mass of each body; the name of an only body is empty."""
+        return [("", self.body(q, v), m)]
+
+    def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
+        """The column of the size of q by which a force [N] and a torque in body axes [N m] act on one body."""
+        return self.generalised(q, force, torque)
+
     @abstractmethod
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         """The column of the size of q by which forces act; None is 0.
@@ -170,6 +183,10 @@ class Translation(Configuration):
     @property
     def dimension(self) -> int:
         return self.axes
+
+    @property
+    def plain(self) -> bool:
+        return True
 
     def kinetic(self, q: Any, v: Any, m: Any) -> Any:
         return 0.5 * ca.dot(v, v)

@@ -65,8 +65,8 @@ class Linked(Configuration):
     def _links(self) -> ca.Function:
         """q -> g of the links, and its slope."""
         q = ca.SX.sym("q", self.size)
-        place = self.free.body(q, ca.SX.zeros(self.size)).position
-        g = ca.vertcat(*[link.g(place) for link in self.links])
+        at = {name: body for name, body, _ in self.free.members(q, ca.SX.zeros(self.size), 1.0)}
+        g = ca.vertcat(*[link.g_of(at) for link in self.links])
         return ca.Function("links", [q], [ca.densify(g), ca.jacobian(g, q)])
 
     def links_at(self, q: Any) -> Any:
@@ -92,6 +92,12 @@ class Linked(Configuration):
 
     def body(self, q: Any, v: Any) -> Body:
         return self.free.body(q, v)
+
+    def members(self, q: Any, v: Any, m: Any) -> list[tuple[str, Body, Any]]:
+        return self.free.members(q, v, m)
+
+    def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
+        return self.free.on(name, q, force, torque)
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         return self.free.generalised(q, force, torque, spun)

@@ -7,6 +7,7 @@ from typing import Any
 from dmoc.configurations.base import Configuration, Translation
 from dmoc.configurations.gyrostat import Gyrostat
 from dmoc.configurations.linked import Linked
+from dmoc.configurations.many import Many
 from dmoc.configurations.rigid import RigidBody
 
 
@@ -22,7 +23,15 @@ def link_sizes(problem: Any) -> list[int]:
 
 
 def _free(problem: Any) -> Configuration:
-    """The configuration of the body without links."""
+    """The configuration of the bodies without links."""
+    if problem.system is not None:
+        bodies = problem.system.bodies
+        parts = tuple(
+            Translation(problem.dimension) if body.inertia is None else RigidBody(body.inertia)
+            for body in bodies
+        )
+        shares = tuple(body.mass / problem.system.mass for body in bodies)
+        return Many(tuple(body.name for body in bodies), parts, shares)
     if problem.inertia is None:
         return Translation(problem.dimension)
     start_mass = problem.mass if problem.actuator.burns else None

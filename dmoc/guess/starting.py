@@ -92,12 +92,16 @@ def starting_guess(
 
 def _along_links(problem: TransferProblem, fractions: np.ndarray) -> tuple[np.ndarray, tuple]:
     """A path that keeps to the links, and the velocities at its ends, 0 where they are free."""
+    from dmoc.configurations.of_problem import configuration_of
     from dmoc.links.along import along_links
 
     (start, first), (goal, last) = problem.start.fixed(), problem.goal.fixed()
     if np.isnan(start).any():
         raise ValueError("a body on links needs a start whose position is known, or a guess of the path")
-    return along_links(problem.links, start, goal, fractions), (np.nan_to_num(first), np.nan_to_num(last))
+    return along_links(problem, configuration_of(problem), (start, goal), fractions), (
+        np.nan_to_num(first),
+        np.nan_to_num(last),
+    )
 
 
 def _least_effort(

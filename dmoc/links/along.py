@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
+
+from dmoc.configurations.base import Configuration
 
 # A path is followed in pieces of this part of the distance between its ends.
 PIECE = 0.01
@@ -18,21 +19,39 @@ MOST_NEWTON = 20
 ON_LINKS = 1e-12
 # A direction that links leave less than this part of [-] leads nowhere: the path first goes aside.
 LOST = 0.05
+# Where a straight line is off its links by less than this part of its length, it is good enough to begin with.
+BENT = 1e-6
 
 
-def along_links(links: Sequence[Any], start: np.ndarray, goal: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-    """Places at fractions of the way from `start` to `goal` that keep to the links, shape (count, dimension).
+def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.ndarray) -> np.ndarray:
+    """Coordinates at fractions of the way between two ends that keep to the links, shape (count, size).
 
-    From each place the path goes on towards the goal as far as the links let it, at an even pace. Entries of
-    the goal that are NaN are free.
+    Rods turn evenly from their first to their last direction, the other bodies go straight. Where links know
+    no such way, the path goes on from place to place towards the goal as far as they let it. Entries of the
+    goal that are NaN are free.
     """
-    on = _OnLinks(links, len(start))
+    start, goal = ends
+    on = _OnLinks(body)
     aim = on.put(np.where(np.isnan(goal), start, goal), ~np.isnan(goal))
+    straight = start + fractions[:, None] * (aim - start)
+    names = problem.system.names if problem.system is not None else ("",)
+    places = dict(zip(names, np.split(straight, len(names), axis=1), strict=True))
+    knows = []
+    for link in problem.links:
+        led = link.led(places, fractions)
+        knows.append(led is not None)
+        places |= led or {}
+    # A rail is straight: what goes straight keeps to it.
+    path = np.hstack([places[name] for name in names])
+    if not any(knows) and np.abs(on.gaps(straight)).max() > BENT * float(np.linalg.norm(aim - start)):
+        path = _step_by_step(on, start, aim, fractions)
+    return np.array([on.put(place) for place in path])
+
+
+def _step_by_step(on: _OnLinks, start: np.ndarray, aim: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """From place to place as near to the straight line as the links let be, at an even pace."""
     distance = float(np.linalg.norm(aim - start))
-    if distance == 0.0:
-        return np.tile(start, (len(fractions), 1))
-    places, piece = [start], PIECE * distance
-    ahead = np.zeros(len(start))
+    places, piece, ahead = [start], PIECE * distance, np.zeros(len(start))
     for _ in range(MOST_PIECES):
         left = aim - places[-1]
         if np.linalg.norm(left) <= piece:
@@ -45,21 +64,24 @@ def along_links(links: Sequence[Any], start: np.ndarray, goal: np.ndarray, fract
         places.append(on.put(places[-1] + piece * ahead))
     path = np.array([*places, aim])
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    found = np.stack([np.interp(fractions * way[-1], way, column) for column in path.T], axis=1)
-    return np.array([on.put(place) for place in found])
+    return np.stack([np.interp(fractions * way[-1], way, column) for column in path.T], axis=1)
 
 
 class _OnLinks:
     """Links as functions of the place."""
 
-    def __init__(self, links: Sequence[Any], dimension: int):
-        q = ca.SX.sym("q", dimension)
-        g = ca.vertcat(*[link.g(q) for link in links])
+    def __init__(self, body: Configuration):
+        q = ca.SX.sym("q", body.size)
+        g = body.links_at(q)
         self.function = ca.Function("links", [q], [ca.densify(g), ca.densify(ca.jacobian(g, q))])
 
     def _at(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         gap, slope = self.function(place)
         return gap.full().ravel(), slope.full()
+
+    def gaps(self, places: np.ndarray) -> np.ndarray:
+        """By how much places, one row each, are off the links."""
+        return self.function(places.T)[0].full()
 
     def put(self, place: np.ndarray, kept: np.ndarray | None = None) -> np.ndarray:
         """The place on the links near by; entries that are `kept` stay, if the links let them."""

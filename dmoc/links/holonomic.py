@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from dmoc.effects.base import Part
+import numpy as np
+
+from dmoc.effects.base import Body, Part
 
 
 class Holonomic(Part, ABC):
@@ -32,6 +35,23 @@ class Holonomic(Part, ABC):
 
         Its slope in q must not vanish where g is zero: |q| - 1, or (|q|^2 - 1) / 2, but never (|q| - 1)^2.
         """
+
+    def g_of(self, at: Mapping[str, Body]) -> Any:
+        """The same for bodies by their names: `g` of the one that the link is `on`, or of the only one."""
+        return self.g(at[getattr(self, "on", "")].position)
+
+    @property
+    def holds(self) -> tuple[str, ...]:
+        """The names of the bodies that it holds; an only body has an empty name."""
+        return (getattr(self, "on", ""),)
+
+    def led(self, places: dict[str, np.ndarray], fractions: np.ndarray) -> dict[str, np.ndarray] | None:
+        """Places of the bodies that it holds, shape (count, dimension) each, led from the first to the last.
+
+        Between these `places` go on a straight line, or as other links have led them. None where the link
+        knows no way.
+        """
+        return None
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the link has no meaning in this many dimensions."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,42 +10,68 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, number, short, vector
+from dmoc.effects.base import Body
 from dmoc.links.holonomic import Holonomic
 
 
 @dataclass(frozen=True)
 class Rod(Holonomic):
-    """A rod without mass from a fixed point to the body: their distance stays its length.
+    """A rod without mass from a fixed point, or from another body: the distance from there stays its length.
 
     Parameters
     ----------
-    anchor : sequence of float
-        The fixed point [m].
+    anchor : sequence of float or str
+        The fixed point [m], or the name of the other body.
     length : float
         Length of the rod [m].
+    on : str
+        The name of the body at its end, where there are several.
     """
 
-    anchor: Vector
+    anchor: Vector | str
     length: float
+    on: str = ""
 
     def __post_init__(self) -> None:
-        checked(self, anchor=vector("Rod: anchor", self.anchor, "m"))
+        if not isinstance(self.anchor, str):
+            checked(self, anchor=vector("Rod: anchor", self.anchor, "m"))
         checked(self, length=number("Rod: length", self.length, "m", positive=True))
 
     def check_dimension(self, dimension: int) -> None:
-        _fits("Rod: anchor", self.anchor, dimension)
+        if not isinstance(self.anchor, str):
+            _fits("Rod: anchor", self.anchor, dimension)
         if dimension == 1:
             raise ValueError(
                 "Rod: a body on a line cannot turn about its anchor; give positions of 2 or 3 entries"
             )
 
     def g(self, q: Any) -> Any:
+        return self._stretched(q - ca.vertcat(*self.anchor))
+
+    def g_of(self, at: Mapping[str, Body]) -> Any:
+        return self._stretched(self.arm(at))
+
+    @property
+    def holds(self) -> tuple[str, ...]:
+        return (self.anchor, self.on) if isinstance(self.anchor, str) else (self.on,)
+
+    def arm(self, at: Mapping[str, Body]) -> Any:
+        """The vector from the anchor to the body at its end [m]."""
+        foot = at[self.anchor].position if isinstance(self.anchor, str) else ca.vertcat(*self.anchor)
+        return at[self.on].position - foot
+
+    def led(self, places: dict[str, np.ndarray], fractions: np.ndarray) -> dict[str, np.ndarray] | None:
+        body = places[self.on]
+        foot = places[self.anchor] if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, body.shape)
+        return {self.on: foot + turned_evenly(body[0] - foot[0], body[-1] - foot[-1], fractions)}
+
+    def _stretched(self, arm: Any) -> Any:
         # Half the square over the length: near zero it is the distance less the length, and a polynomial.
-        arm = q - ca.vertcat(*self.anchor)
         return 0.5 * (ca.dot(arm, arm) / self.length - self.length)
 
     def words(self) -> str:
-        return f"a rod of {self.length:g} m to {_listed(self.anchor)} m"
+        foot = self.anchor if isinstance(self.anchor, str) else f"{_listed(self.anchor)} m"
+        return f"{self.on or 'the body'} on a rod of {self.length:g} m from {foot}"
 
 
 @dataclass(frozen=True)
@@ -58,10 +84,13 @@ class Slider(Holonomic):
         A point of the line [m].
     direction : sequence of float
         The way of the line [-]; made a unit vector.
+    on : str
+        The name of the body, where there are several.
     """
 
     point: Vector
     direction: Vector
+    on: str = ""
 
     def __post_init__(self) -> None:
         checked(self, point=vector("Slider: point", self.point, "m"))
@@ -83,7 +112,9 @@ class Slider(Holonomic):
         return ca.DM(across) @ (q - ca.vertcat(*self.point))
 
     def words(self) -> str:
-        return f"a rail through {_listed(self.point)} m along {_listed(self.direction)}"
+        return (
+            f"{self.on or 'the body'} on a rail through {_listed(self.point)} m along {_listed(self.direction)}"
+        )
 
 
 @dataclass(frozen=True)
@@ -95,9 +126,12 @@ class Surface(Holonomic):
     function : function of the position
         Takes a CasADi position [m] and gives a number that is zero on the surface [m], without a slope of zero
         there.
+    on : str
+        The name of the body, where there are several.
     """
 
     function: Callable
+    on: str = ""
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -107,7 +141,22 @@ class Surface(Holonomic):
         return self.function(q)
 
     def words(self) -> str:
-        return "a surface"
+        return f"{self.on or 'the body'} on a surface"
+
+
+def turned_evenly(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """An arm that turns evenly from one direction to another by the shorter way, shape (count, dimension)."""
+    length = float(np.linalg.norm(first))
+    one = first / length
+    along = float(np.clip(one @ last / np.linalg.norm(last), -1.0, 1.0))
+    across = last - (one @ last) * one
+    if np.linalg.norm(across) < 1e-9 * length:
+        # Straight on or straight back: in the plane against the clock, in space about some axis.
+        aside = np.eye(len(one))[np.argmin(np.abs(one))]
+        across = np.array([-one[1], one[0]]) if len(one) == 2 else aside - (one @ aside) * one
+    across = across / np.linalg.norm(across)
+    angle = np.arccos(along) * fractions[:, None]
+    return length * (np.cos(angle) * one + np.sin(angle) * across)
 
 
 def _fits(name: str, given: Any, dimension: int) -> None:

@@ -178,7 +178,7 @@ class Dynamics:
     @remembered_property
     def depends_on_velocity(self) -> bool:
         """Whether a step of order 2 is implicit: an effect looks at the velocity, or the body turns."""
-        return bool(self.configuration.conditions or split_effects(self.effects, self.configuration)[1])
+        return bool(not self.configuration.plain or split_effects(self.effects, self.configuration)[1])
 
     @remembered_property
     def depends_on_time(self) -> bool:
@@ -218,15 +218,8 @@ class Dynamics:
     def wrench(self) -> ca.Function:
         """(q, u) -> force in space axes [N]; of a rigid body torques on wheels and in body axes, too [N m]."""
         q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)
-        force, torque = self.actuator.wrench(self.configuration.rotation(q), u)
-        if not self.configuration.surplus:
-            return ca.Function("wrench", [q, u], [ca.densify(force)])
-        made = self.configuration.coordinates
-        axes, wheels = int(made.speeds.sum()), self.actuator.spun(u)
-        parts = [ca.SX.zeros(axes) if force is None or not axes else force]
-        parts.append(ca.SX(0, 1) if wheels is None else wheels)
-        parts.append(ca.SX.zeros(3) if torque is None else torque)
-        return ca.Function("wrench", [q, u], [ca.densify(ca.vertcat(*parts))])
+        body = self.configuration
+        return ca.Function("wrench", [q, u], [ca.densify(body.along(q, self.actuator.acts(body, q, u)))])
 
 
 def _taken(inertia: Any, bars: Any, opening: Any) -> Any:
@@ -242,8 +235,7 @@ def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
 
 def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:
     """The force of an actuator on the coordinates q [N], [N m]."""
-    force, torque = actuator.wrench(configuration.rotation(q), u)
-    return configuration.generalised(q, force, torque, actuator.spun(u))
+    return actuator.acts(configuration, q, u)
 
 
 def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -253,9 +245,12 @@ def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
 
 def specific_lagrangian(effects: Sequence[Effect], configuration: Configuration, t, q, v, m) -> Any:
     """Sum of the conservative effects' Lagrangians per unit mass, without the kinetic energy [J/kg]."""
-    body = configuration.body(q, v)
-    terms = [effect.lagrangian_of(t, body, m) for effect in effects]
-    return sum((term for term in terms if term is not None), ca.SX(0))
+    total = ca.SX(0)
+    for _, body, mass in configuration.members(q, v, m):
+        terms = [effect.lagrangian_of(t, body, mass) for effect in effects]
+        mine = sum((term for term in terms if term is not None), ca.SX(0))
+        total = total + (mine if mass is m else mass / m * mine)
+    return total
 
 
 def point_function(
@@ -267,9 +262,10 @@ def point_function(
     lagrangian = specific_lagrangian(effects, configuration, t, q, v, m)
     push = ca.SX.zeros(size)
     for effect in effects:
-        force, torque = effect.wrench_of(t, configuration.body(q, v), m)
-        if force is not None or torque is not None:
-            push = push + configuration.generalised(q, force, torque) / m
+        for name, body, mass in configuration.members(q, v, m):
+            force, torque = effect.wrench_of(t, body, mass)
+            if force is not None or torque is not None:
+                push = push + configuration.on(name, q, force, torque) / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
     change = ca.gradient(lagrangian, q) + moved, ca.gradient(lagrangian, v) + inertia
     return ca.Function("point", [t, q, v, m], [*change, push])
@@ -284,10 +280,14 @@ def split_effects(
     node, since each step has a velocity of its own there.
     """
     t, q, v, m = state_symbols(configuration.size)
-    body = configuration.body(q, v)
+    members = configuration.members(q, v, m)
 
     def looks_at_velocity(effect: Effect) -> bool:
-        acts = [effect.lagrangian_of(t, body, m), *effect.wrench_of(t, body, m)]
+        acts = [
+            act
+            for _, body, mass in members
+            for act in (effect.lagrangian_of(t, body, mass), *effect.wrench_of(t, body, mass))
+        ]
         return any(ca.depends_on(ca.SX(act), v) for act in acts if act is not None)
 
     known = [(looks_at_velocity(effect), effect) for effect in effects]

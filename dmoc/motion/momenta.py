@@ -171,17 +171,25 @@ def _between_links(dynamics: Dynamics, path: DiscretePath, slopes: np.ndarray) -
 
 
 def link_bases(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
-    """Orthonormal bases of the velocities that links let be, shape (places, freedom, freedom - joined).
+    """Bases of the velocities that links let be, shape (places, freedom, freedom - joined).
 
-    Each is turned as little as can be from the one before, so that matrices from one to the next compare.
+    They are orthonormal in the kinetic energy, B' M B = 1, so that velocities and momenta are of one size. Each
+    is turned as little as can be from the one before, so that matrices from one to the next compare.
     """
-    held = dynamics.configuration.joined
+    held, root = dynamics.configuration.joined, inertia_root(dynamics, position[0])
     bars = dynamics.bars(position.T).full().reshape(held, len(position), -1).transpose(1, 2, 0)
-    bases = np.linalg.qr(bars, mode="complete")[0][:, :, held:]
+    bases = np.linalg.qr(np.linalg.solve(root, bars), mode="complete")[0][:, :, held:]
     for before, basis in pairwise(bases):
         left, _, right = np.linalg.svd(basis.T @ before)
         basis[:] = basis @ (left @ right)
-    return bases
+    return np.linalg.solve(root.T, bases)
+
+
+def inertia_root(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
+    """L with L L' = M, the inertia along the independent velocities per unit mass, the same everywhere."""
+    t, q, w, m, _ = dynamics.states()
+    inertia = ca.Function("inertia", [t, q, w, m], [ca.jacobian(dynamics.momentum(t, q, w, m), w)])
+    return np.linalg.cholesky(inertia(0.0, position, 0.0, 1.0).full())
 
 
 def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:

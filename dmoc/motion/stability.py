@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from dmoc.basics.quaternions import angle_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.momenta import step_matrices
+from dmoc.motion.momenta import inertia_root, link_bases, step_matrices
 from dmoc.motion.path import DiscretePath
 
 # A one-step matrix may grow at most this many times as much a step as the exact flow: both are frozen at the
@@ -89,7 +90,38 @@ def flow_matrices(
     function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh
     stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
-    return stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2), constant
+    flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
+    if dynamics.configuration.joined:
+        flow = _between_links(dynamics, path.position[ends], velocity, flow)
+    return flow, constant
+
+
+def _between_links(
+    dynamics: Dynamics, position: np.ndarray, velocity: np.ndarray, flow: np.ndarray
+) -> np.ndarray:
+    """The flow in the ways that links let be, in bases B that turn along with them as little as they must.
+
+    With the slope C of the links, D = d(C w)/dq and the right inverse C+ = M^-1 C' (C M^-1 C')^-1, a small
+    change is dq = B e, dw = B h - C+ D B e, and B changes by -C+ D B. Since B' M B = 1, h = B' M dw.
+    """
+    n, held = dynamics.freedom, dynamics.configuration.joined
+    q, w = ca.SX.sym("q", dynamics.positions), ca.SX.sym("w", n)
+    body = dynamics.configuration
+    turning = ca.jacobian(body.opening(q, w), q) @ body.tangent(q)
+    both = ca.Function("bent", [q, w], [ca.densify(turning), ca.densify(body.bars(q))])
+    bending, bars = (
+        part.full().reshape(held, len(position), n).transpose(1, 0, 2) for part in both(position.T, velocity.T)
+    )
+    basis, root = link_bases(dynamics, position), inertia_root(dynamics, position[0])
+    inertia = root @ root.T
+    light = np.linalg.solve(inertia, bars.transpose(0, 2, 1))
+    across = -light @ np.linalg.solve(bars @ light, bending @ basis)
+    back = basis.transpose(0, 2, 1) @ inertia
+    bent = across.transpose(0, 2, 1) @ inertia @ across
+    stiff = back @ (flow[:, n:, :n] @ basis + flow[:, n:, n:] @ across) + bent
+    damped = back @ flow[:, n:, n:] @ basis
+    none, one = np.zeros_like(stiff), np.broadcast_to(np.eye(n - held), stiff.shape)
+    return np.concatenate([np.concatenate([none, one], 2), np.concatenate([stiff, damped], 2)], 1)
 
 
 def steps_to_turn(path: DiscretePath) -> int:

@@ -85,7 +85,9 @@ class Program:
         sides = []
         for found, free in zip(_intersection(boxes, n), (-np.inf, np.inf), strict=True):
             sides.append(np.full((*found.shape[:-1], len(places)), free))
-            sides[-1][..., places] = found[..., : places.sum()]
+            # Boxes limit a single body; of several all are free.
+            bodies = max(1, int(places.sum()) // n)
+            sides[-1][..., places] = np.tile(found, bodies)[..., : places.sum()]
         put("position", *(side - origin for side in sides))
         put("force", *problem.actuator.bounds(n))
         if problem.free_duration:
@@ -172,7 +174,7 @@ class Program:
     def made_of(self) -> Coordinates | None:
         """Of what parts q is made, where there is more than one place."""
         body = self.dynamics.configuration
-        return body.coordinates if body.surplus else None
+        return body.coordinates if len(body.coordinates.blocks) > 1 or body.surplus else None
 
     def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
@@ -248,8 +250,9 @@ def _open(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
 def _looks_at(link: Any, dynamics: Dynamics, free: np.ndarray) -> bool:
     """Whether a link looks at a coordinate of a boundary position that is free."""
     q = ca.SX.sym("q", len(free))
-    place = dynamics.configuration.body(q, ca.SX.zeros(len(free))).position
-    return any(ca.which_depends(ca.SX(link.g(place)), q[i], 1, True)[0] for i in np.flatnonzero(free))
+    members = dynamics.configuration.members(q, ca.SX.zeros(len(free)), 1.0)
+    g = ca.SX(link.g_of({name: body for name, body, _ in members}))
+    return any(ca.which_depends(g, q[i], 1, True)[0] for i in np.flatnonzero(free))
 
 
 def _fix(lower: np.ndarray, upper: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:

@@ -111,6 +111,11 @@ class Actuator(ABC):
         """Limits on the motion that belong to it, such as on the momenta of wheels."""
         return ()
 
+    def acts(self, configuration: Any, q: Any, u: Any) -> Any:
+        """The column of the size of q by which it acts on a configuration [N], [N m]."""
+        force, torque = self.wrench(configuration.rotation(q), u)
+        return configuration.generalised(q, force, torque, self.spun(u))
+
     def spun(self, u: Any) -> Any:
         """Torques on the reaction wheels [N m]; None where there are none."""
         return None

@@ -12,6 +12,10 @@ from dmoc.basics.quaternions import AXES, QUATERNION, rotation_of
 from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
+from dmoc.ends.each import each_of
+from dmoc.links.push import Several
+from dmoc.links.system import System
+from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
 
 # A boundary state may be off a link by this part of its position, and leave it at this part of its speed [-]:
@@ -176,12 +180,15 @@ def check_links(problem: Any) -> None:
         return
     if problem.inertia is not None:
         raise ValueError("links hold bodies without an attitude so far; leave out the inertia, or the links")
-    n = problem.dimension
+    n = len(problem.start.fixed()[0])
     q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
+    names = problem.system.names if problem.system is not None else ("",)
+    places = dict(zip(names, ca.vertsplit(q, problem.dimension), strict=True))
+    at = {name: Body(place, place) for name, place in places.items()}
     rows = []
     for i, link in enumerate(problem.links):
         words = f"{type(link).__name__}.g (link {i + 1})"
-        g = evaluated(words, link.g, [q], "write it with casadi's functions")
+        g = evaluated(words, lambda _, link=link: link.g_of(at), [q], "write it with casadi's functions")
         if not ca.depends_on(ca.SX(g), q):
             raise ValueError(f"{words} does not depend on the position; it must be zero where the link holds")
         rows.append(ca.vec(ca.SX(g)))
@@ -220,6 +227,30 @@ def _check_end(words: str, link: Any, symbols: tuple, position: np.ndarray, velo
         raise ValueError(f"{words}: its velocity leaves it at {rate:.3g} {unit}; turn the velocity along it")
 
 
+def of_system(problem: Any) -> dict[str, Any]:
+    """What a problem of several bodies is made of: masses, links and ends from the system."""
+    system = problem.mass if isinstance(problem.mass, System) else problem.system
+    actuator = problem.actuator
+    several = entries(actuator)
+    if several is not None and not isinstance(actuator, Actuator):
+        actuator = Several(several)
+    if system is None:
+        return {"actuator": actuator}
+    if problem.inertia is not None:
+        raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
+    if problem.constraints:
+        raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
+    ends = {name: each_of(name, getattr(problem, name), system.names) for name in ("start", "goal")}
+    more = tuple(link for link in problem.links if link not in system.links)
+    return {
+        "system": system,
+        "mass": system.mass,
+        "links": (*system.links, *more),
+        "actuator": actuator,
+        **ends,
+    }
+
+
 def _check_rank(problem: Any, name: str, slopes: Any) -> None:
     """Each link must hold in a way that the others do not."""
     matrix = np.array(ca.DM(slopes))
@@ -227,5 +258,5 @@ def _check_rank(problem: Any, name: str, slopes: Any) -> None:
     if np.linalg.matrix_rank(matrix, tol=1e-9) < len(matrix):
         names = ", ".join(f"{type(link).__name__} (link {i + 1})" for i, link in enumerate(problem.links))
         raise ValueError(f"at the {name} the links hold the same motion twice: {names}; leave one of them out")
-    if len(matrix) >= problem.dimension:
+    if len(matrix) >= matrix.shape[1]:
         raise ValueError(f"at the {name} {len(matrix)} equations of links leave the body no way to move")

@@ -14,12 +14,13 @@ from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.wheels import with_wheels
 from dmoc.links.holonomic import Holonomic
+from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
-from dmoc.scene.fits import check_acts_on, check_functions, check_links, turning_checked
+from dmoc.scene.fits import check_acts_on, check_functions, check_links, of_system, turning_checked
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -32,8 +33,9 @@ class TransferProblem:
 
     Parameters
     ----------
-    mass : float
-        Mass of the body at the start [kg].
+    mass : float or System
+        Mass of the body at the start [kg], or several bodies; start and goal are then dictionaries of the
+        `State` of each by its name, and a list of actuators acts on them.
     start, goal : Boundary
         Where the transfer starts and ends, for example `State(position, velocity)` in m and m/s.
     duration : float or (float, float)
@@ -57,6 +59,8 @@ class TransferProblem:
         it the body turns, and its ends are `Pose` or, for the attitude alone, `Attitude`.
     links : sequence of Holonomic
         Rods, rails and surfaces that hold the body.
+    system : System, optional
+        Set when the first argument is a system.
     name, parameters
         Provenance, set when the problem is loaded from a file.
 
@@ -66,22 +70,24 @@ class TransferProblem:
         If a number has no meaning or two parts do not fit together.
     """
 
-    mass: float
-    start: Boundary
-    goal: Boundary
+    mass: Any
+    start: Any
+    goal: Any
     duration: float | tuple[float, float]
     effects: Sequence[Effect] = ()
-    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+    actuator: Any = FreeForce()  # noqa: RUF009 - immutable
     objective: Objective = Effort()  # noqa: RUF009 - immutable
     constraints: Sequence[Constraint] = ()
     guess: Any = None
     start_time: float = 0.0
     inertia: Any = None
     links: Sequence[Holonomic] = ()
+    system: System | None = None
     name: str = field(default="problem", compare=False)
     parameters: dict = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
+        checked(self, **of_system(self))
         checked(
             self,
             mass=number("mass", self.mass, "kg", positive=True),

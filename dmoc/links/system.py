@@ -1,0 +1,77 @@
+"""Several bodies that links hold together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dmoc.basics.arguments import checked, entries, number, of_kind, short
+from dmoc.links.holonomic import Holonomic
+
+
+@dataclass(frozen=True)
+class Member:
+    """A body of a system: a point mass.
+
+    Parameters
+    ----------
+    name : str
+        What links, actuators and ends call it.
+    mass : float
+        [kg].
+    """
+
+    name: str
+    mass: float
+    inertia: Any = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.isidentifier():
+            raise ValueError(f"Member: name must be a word of letters, digits and _; got {short(self.name)}")
+        checked(self, mass=number(f"Member: mass of {self.name}", self.mass, "kg", positive=True))
+        if self.inertia is not None:
+            raise ValueError("Member: bodies of a system are point masses so far; leave out the inertia")
+
+
+@dataclass(frozen=True)
+class System:
+    """Bodies that move together, held by links: the first argument of a `TransferProblem` in place of a mass.
+
+    Parameters
+    ----------
+    bodies : sequence of Member
+    links : sequence of Holonomic
+        Rods, rails and surfaces, which name the bodies that they hold.
+    """
+
+    bodies: Sequence[Member]
+    links: Sequence[Holonomic] = ()
+
+    def __post_init__(self) -> None:
+        bodies, links = entries(self.bodies) or (), entries(self.links)
+        if not bodies or links is None:
+            raise ValueError(f"System: bodies and links must be lists; got {short(self.bodies)}")
+        for i, body in enumerate(bodies):
+            of_kind(f"System: bodies[{i}]", body, Member)
+        names = [body.name for body in bodies]
+        if len(set(names)) < len(names):
+            raise ValueError(f"System: each body needs a name of its own; got {', '.join(names)}")
+        for i, link in enumerate(links):
+            of_kind(f"System: links[{i}]", link, Holonomic)
+            for name in link.holds:
+                if name not in names:
+                    raise ValueError(
+                        f"System: {type(link).__name__} (link {i + 1}) holds {name!r}; the bodies are "
+                        f"{', '.join(names)}"
+                    )
+        checked(self, bodies=tuple(bodies), links=tuple(links))
+
+    @property
+    def mass(self) -> float:
+        """Of all bodies [kg]."""
+        return float(sum(body.mass for body in self.bodies))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(body.name for body in self.bodies)
