@@ -21,10 +21,11 @@ WHEELS = "wheels"
 
 
 class Block(NamedTuple):
-    """A part of q: its kind and how many entries it has."""
+    """A part of q: its kind, how many entries it has, and the body of a system that it belongs to."""
 
     kind: str
     size: int
+    body: str = ""
 
     @property
     def freedom(self) -> int:
@@ -44,7 +45,7 @@ class Coordinates:
         return cls((Block(PLACE, axes),))
 
     @classmethod
-    def of_body(cls, axes: int, wheels: int = 0) -> Coordinates:
+    def of_rigid_body(cls, axes: int, wheels: int = 0) -> Coordinates:
         """Those of a rigid body: place (if there are axes), wheels (if there are some), attitude."""
         blocks = Block(PLACE, axes), Block(WHEELS, wheels), Block(ATTITUDE, QUATERNION)
         return cls(tuple(block for block in blocks if block.size))
@@ -83,6 +84,29 @@ class Coordinates:
     def quaternions(self) -> list[slice]:
         """Where the unit quaternions stand among the coordinates."""
         return [at for block, at in zip(self.blocks, self._slices(), strict=True) if block.kind == ATTITUDE]
+
+    @property
+    def axes(self) -> int:
+        """Number of axes of space; 0 where there is no place."""
+        return next((block.size for block in self.blocks if block.kind == PLACE), 0)
+
+    @property
+    def place_labels(self) -> list[str]:
+        """A name for each entry of a place: x, y, z or, of a system, those of its bodies."""
+        return [
+            f"{block.body}.{axis}".removeprefix(".")
+            for block in self.blocks
+            if block.kind == PLACE
+            for axis in "xyz"[: block.size]
+        ]
+
+    def of_body(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Which coordinates, and which velocities, belong to a body of a system."""
+        mine = [block.body == name for block in self.blocks]
+        return (
+            np.repeat(mine, [block.size for block in self.blocks]),
+            np.repeat(mine, [block.freedom for block in self.blocks]),
+        )
 
     @property
     def turns(self) -> bool:

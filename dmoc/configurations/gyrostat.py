@@ -52,7 +52,7 @@ class Gyrostat(RigidBody):
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates.of_body(self.axes, len(self.wheels))
+        return Coordinates.of_rigid_body(self.axes, len(self.wheels))
 
     def _momentum(self, column: Any) -> tuple[Any, Any]:
         """The entries of a column that belong to the wheels, and A times them."""

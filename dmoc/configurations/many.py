@@ -47,7 +47,10 @@ class Many(Configuration):
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates(tuple(block for part in self.parts for block in part.coordinates.blocks))
+        named = zip(self.bodies, self.parts, strict=True)
+        return Coordinates(
+            tuple(block._replace(body=name) for name, part in named for block in part.coordinates.blocks)
+        )
 
     @property
     def dimension(self) -> int:

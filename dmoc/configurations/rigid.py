@@ -50,7 +50,7 @@ class RigidBody(Configuration):
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates.of_body(self.axes)
+        return Coordinates.of_rigid_body(self.axes)
 
     @property
     def dimension(self) -> int:

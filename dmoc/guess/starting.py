@@ -48,10 +48,8 @@ def starting_guess(
         point = starting_guess, guess_duration
         return turning_guess(problem, (mesh, order, hold), given, duration, point)
     if isinstance(given, DiscretePath):
-        if given.position.shape[1] != problem.dimension:
-            raise ValueError(
-                f"guess has {given.position.shape[1]} axes but the problem has {problem.dimension}"
-            )
+        if given.position.shape[1] != problem.size:
+            raise ValueError(f"guess has {given.position.shape[1]} axes but the problem has {problem.size}")
         given.refuse_unusable("guess")
         if given.control.shape[1] != problem.controls:
             given = _of_other_controls(problem, given, force)
@@ -229,9 +227,9 @@ def _given_path(problem: TransferProblem, given: Any, duration: float, fractions
             f"(times, positions, controls), or a former solution; {short(given)} fails: "
             f"{' '.join(str(error).split())[:120]}"
         ) from error
-    if position.shape != (len(fractions), problem.dimension):
+    if position.shape != (len(fractions), problem.size):
         found = position.shape[-1] if position.ndim == 2 else f"{position.ndim - 1} times nested"
-        raise ValueError(f"guess has {found} axes but the problem has {problem.dimension}")
+        raise ValueError(f"guess has {found} axes but the problem has {problem.size}")
     return position
 
 

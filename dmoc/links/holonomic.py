@@ -53,6 +53,10 @@ class Holonomic(Part, ABC):
         """
         return None
 
+    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
+        """Lines that a picture draws of it for places of the bodies, shape (times, points, dimension) each [m]."""
+        return []
+
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the link has no meaning in this many dimensions."""
 

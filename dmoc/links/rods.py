@@ -65,6 +65,11 @@ class Rod(Holonomic):
         foot = places[self.anchor] if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, body.shape)
         return {self.on: foot + turned_evenly(body[0] - foot[0], body[-1] - foot[-1], fractions)}
 
+    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
+        body = places[self.on]
+        foot = places[self.anchor] if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, body.shape)
+        return [np.stack([foot, body], axis=1)]
+
     def _stretched(self, arm: Any) -> Any:
         # Half the square over the length: near zero it is the distance less the length, and a polynomial.
         return 0.5 * (ca.dot(arm, arm) / self.length - self.length)
@@ -110,6 +115,11 @@ class Slider(Holonomic):
         # The rows of V' after the first span what is across the line.
         across = np.linalg.svd(way[None])[2][1:]
         return ca.DM(across) @ (q - ca.vertcat(*self.point))
+
+    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
+        way, point = np.array(self.direction), np.array(self.point)
+        along = (places[self.on] - point) @ way
+        return [(point + np.array([[along.min()], [along.max()]]) * way)[None]]
 
     def words(self) -> str:
         return (

@@ -184,7 +184,7 @@ class DiscretePath:
         made, moving = self.coordinates, self.coordinates.parted(velocity)
         slopes = [
             0.5 * times(at, np.append(0.0, rate)) if kind == ATTITUDE else rate
-            for (kind, _), at, rate in zip(made.blocks, made.cut(self.position[place]), moving, strict=True)
+            for (kind, *_), at, rate in zip(made.blocks, made.cut(self.position[place]), moving, strict=True)
         ]
         return np.concatenate(slopes)
 

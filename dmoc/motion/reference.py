@@ -45,7 +45,7 @@ def apart(made_of: Coordinates, one: np.ndarray, other: np.ndarray) -> np.ndarra
     return np.concatenate(
         [
             rotation_vectors(multiplied(conjugate(b), a)) if kind == ATTITUDE else a - b
-            for (kind, _), a, b in parts
+            for (kind, *_), a, b in parts
         ],
         axis=-1,
     )

@@ -12,6 +12,7 @@ from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import as_path, whole_file
 from dmoc.parts.objectives import Objective
 from dmoc.plots.ledger import draw_ledger
+from dmoc.plots.linked import draw_bodies, draw_reactions, draw_speeds
 from dmoc.plots.path import burning, draw_path, entries_once, is_wide
 from dmoc.plots.style import (
     AXIS_COLOURS,
@@ -92,9 +93,12 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
             "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
         )
         turns = bool(solution.path.attitudes)
-        wide, drawn = is_wide(solution), _turning_panels(solution) if turns else PANELS
+        held = solution.reaction is not None
+        wide = not held and is_wide(solution)
+        drawn = _turning_panels(solution) if turns else _linked_panels(solution) if held else PANELS
         path, panels = _panels(page, 3 if turns else solution.dimension, wide, len(drawn))
-        (draw_path if solution.dimension else draw_sphere)(path, solution, **({"beside": True} if wide else {}))
+        left = draw_bodies if held else draw_path if solution.dimension else draw_sphere
+        left(path, solution, **({"beside": True} if wide else {}))
         size, unit = time_axis = readable(solution.end_times, "s")
         for panel, draw in zip(panels, drawn, strict=True):
             draw(panel, solution, size)
@@ -120,6 +124,12 @@ def _turning_panels(solution: Solution) -> list[Any]:
     controls = [partial(draw_controls, panel=panel) for panel in control_panels(solution)]
     stored = [] if solution.wheel_momentum is None else [draw_wheels]
     return [*controls, *stored, draw_rates, draw_angle]
+
+
+def _linked_panels(solution: Solution) -> list[Any]:
+    """What is drawn over time of bodies that links hold: controls, speeds and the forces of the links."""
+    controls = [partial(draw_controls, panel=panel) for panel in control_panels(solution)]
+    return [*controls, draw_speeds, draw_reactions]
 
 
 def _panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[Any, list[Any]]:

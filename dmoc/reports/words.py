@@ -57,6 +57,7 @@ def scene(problem: TransferProblem) -> RenderableType:
             ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
             ("actuator", problem.actuator.words()),
             ("objective", _objective(problem)),
+            *([("links", [link.words() for link in problem.links])] if problem.links else []),
             ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
         ]
     )

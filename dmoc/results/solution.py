@@ -109,7 +109,33 @@ class Solution:
     @property
     def dimension(self) -> int:
         """Number of axes, 1 to 3; 0 for an attitude alone."""
-        return self.path.place.shape[1]
+        return self.path.coordinates.axes
+
+    def of(self, body: str) -> tuple[np.ndarray, np.ndarray]:
+        """Positions at the nodes [m] and velocities at the step ends [m/s] of one body of a system.
+
+        Raises
+        ------
+        ValueError
+            If no body has this name.
+        """
+        made = self.path.coordinates
+        names = list(dict.fromkeys(block.body for block in made.blocks))
+        if body not in names:
+            raise ValueError(f"no body is called {body!r}; there are {', '.join(map(repr, names))}")
+        places, speeds = made.of_body(body)
+        return self.path.position[:, places & made.places], self.velocity[:, speeds[made.speeds]]
+
+    @property
+    def reaction(self) -> np.ndarray | None:
+        """Forces of links at the nodes [N for each m of g], one column an equation; None without links.
+
+        What a link exerts is minus the slope of its g times this: a rod pulls where it is positive.
+        """
+        path = self.path
+        if path.reaction is None or not (held := path.reaction.shape[1] - len(path.attitudes)):
+            return None
+        return path.reaction[:, -held:] * path.mass[:, None]
 
     @property
     def duration(self) -> float:

@@ -96,7 +96,7 @@ def _variables(solution: Any) -> Table:
         name: (dims, values, {"units": unit, "long_name": words})
         for name, (dims, values, unit, words) in table.items()
     }
-    labels = {"axis": list("xyz"[: solution.dimension]), "channel": list(about.control_labels)}
+    labels = {"axis": list(path.coordinates.place_labels), "channel": list(about.control_labels)}
     coordinates = {name: ((name,), np.array(values, object), {"units": "1"}) for name, values in labels.items()}
     return variables | _multipliers(solution) | coordinates
 
@@ -236,12 +236,12 @@ def _dimensions(solution: Any, kind: str, shape: tuple[int, int]) -> tuple[str, 
     kind = {"smooth": "node", "control": "step" if solution.hold else "node"}.get(kind, kind)
     sizes = {"node": len(solution.path.position), "step": solution.steps}
     first = kind if sizes.get(kind) == shape[0] else f"count_{shape[0]}"
-    return first, "axis" if shape[1] == solution.dimension else f"component_{shape[1]}"
+    return first, "axis" if shape[1] == solution.path.place.shape[1] else f"component_{shape[1]}"
 
 
 def _check_shapes(solution: Any) -> Any:
     """Raise ValueError unless the arrays fit together, as those of a file that was edited may not."""
-    path, axes = solution.path, solution.dimension
+    path, axes = solution.path, solution.path.place.shape[1]
     degree = scheme(path.order).degree
     nodes = solution.steps * degree + 1
     controls = solution.steps if path.hold else nodes

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
-from dmoc.configurations.coordinates import ATTITUDE, PLACE, WHEELS, Coordinates
+from dmoc.configurations.coordinates import ATTITUDE, PLACE, WHEELS, Block, Coordinates
 from dmoc.results.netcdf import Table, as_array
 
 # The variables of each kind of block: its coordinates along the path, its velocities at the start and the goal.
@@ -64,9 +65,11 @@ def turning_path(table: Table) -> tuple[Coordinates | None, np.ndarray, np.ndarr
     """What coordinates in a file are made of (None: of a place), they, and the velocities at both ends."""
     if "attitude" not in table:
         position, start, goal = (as_array(table, name) for name in NAMES[PLACE])
-        return None, position, start, goal
+        bodies = Counter(str(label).rpartition(".")[0] for label in table["axis"][1])
+        several = Coordinates(tuple(Block(PLACE, axes, body) for body, axes in bodies.items()))
+        return several if any(bodies) else None, position, start, goal
     wheels = as_array(table, "wheel_integral").shape[1] if "wheel_integral" in table else 0
-    made = Coordinates.of_body(as_array(table, "position").shape[1], wheels)
+    made = Coordinates.of_rigid_body(as_array(table, "position").shape[1], wheels)
     kinds = [block.kind for block in made.blocks]
     position, start, goal = (
         np.concatenate([as_array(table, NAMES[kind][which]) for kind in kinds], axis=-1)

@@ -137,6 +137,11 @@ class TransferProblem:
         return self.start.dimension
 
     @property
+    def size(self) -> int:
+        """Number of entries that say where everything is: those of the positions of all bodies."""
+        return len(self.start.fixed()[0])
+
+    @property
     def controls(self) -> int:
         """Number of controls at a node."""
         return self.actuator.size(self.dimension)

@@ -81,7 +81,7 @@ def first_path(
     mesh: Any = None,
 ) -> DiscretePath:
     """The guess on the last mesh; order and steps that are not given are those that the motion needs."""
-    if problem.inertia is not None and not hold:
+    if (problem.inertia is not None or problem.links) and not hold:
         order = order or ORDER_OF_TURNING
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
     first = guess_on(problem, ends, order or 2, hold, guess)

@@ -160,7 +160,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
     while True:
         number += 1
         waves = np.sin(np.pi * np.outer(base.fractions, [1, 2]))
-        bend = waves @ draw.normal(size=(2, problem.dimension)) * 0.25 * extent
+        bend = waves @ draw.normal(size=(2, problem.size)) * 0.25 * extent
         yield f"bend {number}", replace(base, position=base.position + bend)
 
 
