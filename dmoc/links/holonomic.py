@@ -54,7 +54,7 @@ class Holonomic(Part, ABC):
         return None
 
     def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
-        """Lines that a picture draws of it for places of the bodies, shape (times, points, dimension) each [m]."""
+        """Lines that a picture draws of it for places of the bodies, (times, points, dimension) each [m]."""
         return []
 
     def check_dimension(self, dimension: int) -> None:

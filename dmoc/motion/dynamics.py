@@ -162,18 +162,29 @@ class Dynamics:
         axes: q moves by Z(q) e, so that de/dt = de' - w x e.
         """
         t, q, w, m, v = self.states()
-        rate = self.acceleration(t, q, w, m, ca.DM.zeros(self.freedom))
-        if not self.configuration.surplus:
-            jacobian = ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
-        else:
-            tangent, turned = self.configuration.tangent(q), ca.SX.sym("e", self.freedom)
-            moving = ca.jacobian(v, q) @ tangent - ca.jacobian(ca.jtimes(tangent @ turned, q, v), turned)
-            inverse = ca.solve(tangent.T @ tangent, tangent.T)
-            above = ca.horzcat(inverse @ moving, ca.SX.eye(self.freedom))
-            below = ca.horzcat(ca.jacobian(rate, q) @ tangent, ca.jacobian(rate, w))
-            jacobian = ca.vertcat(above, below)
+        jacobian = self._slopes((t, q, w, m, v), self.acceleration(t, q, w, m, ca.DM.zeros(self.freedom)))
         constant = not ca.depends_on(jacobian, ca.vertcat(t, q, w, *([m] if self.actuator.burns else [])))
         return ca.Function("flow", [t, q, w, m], [ca.densify(jacobian)]), constant
+
+    @remembered_property
+    def linearised_under_thrust(self) -> ca.Function:
+        """(t, q, w, m, u) -> the same slopes under controls that stay."""
+        t, q, w, m, v = self.states()
+        u = ca.SX.sym("u", self.controls)
+        jacobian = self._slopes((t, q, w, m, v), self.acceleration(t, q, w, m, self.wrench(q, u)))
+        return ca.Function("flow", [t, q, w, m, u], [ca.densify(jacobian)])
+
+    def _slopes(self, state: tuple, rate: Any) -> Any:
+        """Slopes of the motion whose dw/dt is `rate` in (q, w)."""
+        _, q, w, _, v = state
+        if not self.configuration.surplus:
+            return ca.jacobian(ca.vertcat(v, rate), ca.vertcat(q, v))
+        tangent, turned = self.configuration.tangent(q), ca.SX.sym("e", self.freedom)
+        moving = ca.jacobian(v, q) @ tangent - ca.jacobian(ca.jtimes(tangent @ turned, q, v), turned)
+        inverse = ca.solve(tangent.T @ tangent, tangent.T)
+        above = ca.horzcat(inverse @ moving, ca.SX.eye(self.freedom))
+        below = ca.horzcat(ca.jacobian(rate, q) @ tangent, ca.jacobian(rate, w))
+        return ca.vertcat(above, below)
 
     @remembered_property
     def depends_on_velocity(self) -> bool:
@@ -231,11 +242,6 @@ def _taken(inertia: Any, bars: Any, opening: Any) -> Any:
 def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
     """Whether the kinetic energy of a step is taken from its nodes; else it is `step_inertia`."""
     return not (configuration.surplus and degree == 1)
-
-
-def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:
-    """The force of an actuator on the coordinates q [N], [N m]."""
-    return actuator.acts(configuration, q, u)
 
 
 def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.motion.dynamics import Dynamics, actuation
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
@@ -209,7 +209,7 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
     nodes = ca.vertsplit(q, n)
     controls = [u[:size] if hold else u[size * j : size * (j + 1)] for j in range(rule.degree + 1)]
     push = [
-        actuation(body, dynamics.actuator, place + origin, control) / m[j]
+        dynamics.actuator.acts(body, place + origin, control) / m[j]
         for j, (place, control) in enumerate(zip(nodes, controls, strict=True))
     ]
 

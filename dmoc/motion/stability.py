@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -10,7 +11,15 @@ import numpy as np
 from dmoc.basics.quaternions import angle_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.momenta import inertia_root, link_bases, step_matrices
+from dmoc.motion.mesh import step_nodes
+from dmoc.motion.momenta import (
+    inertia_root,
+    link_bases,
+    node_velocities,
+    rates_along,
+    step_matrices,
+    velocity_along,
+)
 from dmoc.motion.path import DiscretePath
 
 # A one-step matrix may grow at most this many times as much a step as the exact flow: both are frozen at the
@@ -32,7 +41,7 @@ HARMLESS = 0.5
 # own that are off by degrees, and Ipopt finds them.
 TURN_A_STEP = {2: np.radians(30), 4: np.radians(90), 6: np.radians(90), 8: np.radians(90)}
 
-# The exponential of a flow is that of this part of it, a Cayley transform, to the power of so many.
+# An exponential of a matrix is that of its part of this number, a Cayley transform, to the same power.
 SQUARED = 64
 
 
@@ -71,20 +80,33 @@ def growth_along(
     exact = np.exp(h[looked_at] * rates.real.max(axis=(0, 2)))
     if dynamics.configuration.joined:
         # What links hold has another inertia in every place: its flow changes within a step.
-        exact = np.maximum(exact, _radius_over(flow[looked_at], flow[looked_at + 1], h[looked_at]))
+        exact = np.maximum(exact, _radius_of_flow(dynamics, path, start_time, velocity)[looked_at])
     ours = np.abs(np.linalg.eigvals(matrices[looked_at])).max(axis=1)
     frequency = h[looked_at] * np.abs(rates).max(axis=(0, 2))
     return Growth(float(np.max(ours / exact)), limit, float(frequency.max()), constant)
 
 
-def _radius_over(first: np.ndarray, last: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Spectral radius of the flow over steps in whose halves it is that at their begin and at their end."""
-    one, part = np.eye(first.shape[1]), (0.5 * h / SQUARED)[:, None, None]
-    begun, ended = (
-        np.linalg.matrix_power(np.linalg.solve(one - 0.5 * part * flow, one + 0.5 * part * flow), SQUARED)
-        for flow in (first, last)
-    )
-    return np.abs(np.linalg.eigvals(ended @ begun)).max(axis=1)
+def _radius_of_flow(
+    dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
+) -> np.ndarray:
+    """Spectral radius of the flow under the controls over every step, in pieces from node to node."""
+    rule, at, n = scheme(path.order), step_nodes(len(path.mesh) - 1, scheme(path.order)), dynamics.freedom
+    ends = velocity_along(dynamics, path.position[:: rule.degree], velocity)
+    rates = rates_along(dynamics, path.position, node_velocities(path, ends))
+    times = start_time + path.duration * path.fractions
+    controls = path.control
+    if path.hold:
+        controls = controls[np.minimum(np.arange(len(times)) // rule.degree, len(controls) - 1)]
+    given = times[None], path.position.T, rates.T, path.mass[None], controls.T
+    stacked = np.array(dynamics.linearised_under_thrust(*given))
+    flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
+    flow = _between_links(dynamics, path.position, rates, flow)
+    one, whole = np.eye(flow.shape[1]), np.eye(flow.shape[1])
+    for first, last in pairwise(at):
+        part = ((times[last] - times[first]) / SQUARED)[:, None, None] * 0.5 * (flow[first] + flow[last])
+        piece = np.linalg.solve(one - 0.5 * part, one + 0.5 * part)
+        whole = np.linalg.matrix_power(piece, SQUARED) @ whole
+    return np.abs(np.linalg.eigvals(whole)).max(axis=1)
 
 
 def _rate_bound(flow: np.ndarray) -> np.ndarray:
