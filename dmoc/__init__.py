@@ -71,10 +71,10 @@ if TYPE_CHECKING:
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.push import JointTorque as JointTorque
     from dmoc.links.push import On as On
-    from dmoc.links.push import Several as Several
     from dmoc.links.rods import Rod as Rod
     from dmoc.links.rods import Slider as Slider
     from dmoc.links.rods import Surface as Surface
+    from dmoc.links.several import Several as Several
     from dmoc.links.system import Member as Member
     from dmoc.links.system import System as System
     from dmoc.motion.march import Trajectory as Trajectory

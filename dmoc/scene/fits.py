@@ -13,7 +13,7 @@ from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
 from dmoc.ends.each import each_of
-from dmoc.links.push import Several
+from dmoc.links.several import Several
 from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
