@@ -62,6 +62,8 @@ class Actuator(ABC):
     moves_body: ClassVar[bool] = True
     # The unit of what `Effort` gives with it.
     effort_unit: ClassVar[str] = "N^2 s"
+    # The unit of what `Fuel` gives with it where it burns nothing.
+    meter_unit: ClassVar[str] = "N s"
     # Pictures label the line at the force limit with this.
     limit_label: ClassVar[str] = "limit"
 

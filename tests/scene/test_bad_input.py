@@ -67,6 +67,7 @@ MAKES = {
     "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6},
     "Attitude": {"quaternion": (1, 0, 0, 0), "rate": (0, 0, 0), "other_way": False},
     "BallForce": {"limit": 2.0},
+    "BallTorque": {"limit": 2.0},
     "BoxForce": {"limit": 2.0},
     "CircularOrbit": {"radius": 2.0, "mu": 1.0, "center": (0, 0), "normal": None, "clockwise": False},
     "ClohessyWiltshire": {"mean_motion": 0.1},
