@@ -150,7 +150,7 @@ class Dynamics:
         inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
         pulled = dldq + push
         along = ca.solve(inertia, pulled[:axes] + f[:axes] / m - change) if axes else ca.SX.zeros(0)
-        torque = body.along(q, pulled)[before:] + f[before:] / m
+        torque = body.along(q, pulled)[before:] + body.turning_share(m) * f[before:] / m
         rates = body.accelerations(w, along, torque, f[axes:before], m)
         return ca.substitute(rates, slope, body.velocity(q, w))
 
@@ -233,9 +233,9 @@ def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
     return not (configuration.surplus and degree == 1)
 
 
-def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any) -> Any:
-    """The force of an actuator on the coordinates q [N], [N m]."""
-    return actuator.acts(configuration, q, u)
+def actuation(configuration: Configuration, actuator: Actuator, q: Any, u: Any, m: Any) -> Any:
+    """The force of an actuator on the coordinates q, per unit mass [m/s^2], [m^2/s^2]."""
+    return configuration.shared(actuator.acts(configuration, q, u) / m, m)
 
 
 def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -267,8 +267,8 @@ def point_function(
             if force is not None or torque is not None:
                 push = push + configuration.on(name, q, force, torque) / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
-    change = ca.gradient(lagrangian, q) + moved, ca.gradient(lagrangian, v) + inertia
-    return ca.Function("point", [t, q, v, m], [*change, push])
+    change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
+    return ca.Function("point", [t, q, v, m], [*change, configuration.shared(push, m)])
 
 
 def split_effects(

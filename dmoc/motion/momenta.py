@@ -209,7 +209,7 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
     nodes = ca.vertsplit(q, n)
     controls = [u[:size] if hold else u[size * j : size * (j + 1)] for j in range(rule.degree + 1)]
     push = [
-        actuation(body, dynamics.actuator, place + origin, control) / m[j]
+        actuation(body, dynamics.actuator, place + origin, control, m[j])
         for j, (place, control) in enumerate(zip(nodes, controls, strict=True))
     ]
 

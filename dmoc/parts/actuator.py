@@ -54,6 +54,8 @@ class Actuator(ABC):
     # A throttle among the controls equals |F|, rounded at zero over this part of the largest thrust [-];
     # None for an actuator without such a throttle.
     smoothing: float | None = None
+    # What becomes of the inertia of a body that turns while it burns: "scaled" with the mass, or "constant".
+    inertia_law: str = "scaled"
     # Whether it is off for parts of a usual transfer: pictures then shade the times when it is on.
     coasts: ClassVar[bool] = False
     # Whether it acts on rigid bodies alone.

@@ -133,6 +133,7 @@ MAKES = {
         "both_ways": False,
         "exhaust_velocity": 100.0,
         "dry_mass": 0.1,
+        "inertia_law": "scaled",
     },
     "Torque": {"limit": 2.0},
     "TransferProblem": scene(
