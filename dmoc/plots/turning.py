@@ -110,7 +110,7 @@ def paths_of_points(solution: Solution) -> dict[str, np.ndarray]:
         within_steps(solution, part)[1] for part in (solution.position, solution.path.attitudes[0])
     )
     return {
-        f"path of its point ({', '.join(f'{x:g}' for x in point)}) m": place
+        f"path of point ({', '.join(f'{x:g}' for x in point)}) m": place
         + rotated(normalised(attitude), np.broadcast_to(point, place.shape))
         for point in sorted(points)
     }

@@ -162,5 +162,5 @@ def test_what_the_point_would_need_is_named():
 def test_the_path_of_the_point_is_drawn():
     page = figure(solve(rod(BALL), steps=20))
     lines = {line.get_label(): line for axes in page.axes for line in axes.lines}
-    drawn = np.array(lines["path of its point (0.8, 0, 0) m"].get_data_3d()).T
+    drawn = np.array(lines["path of point (0.8, 0, 0) m"].get_data_3d()).T
     assert drawn[0] == pytest.approx(TIP) and np.ptp(drawn, axis=0)[1] > 0.5
