@@ -91,6 +91,12 @@ class Torque(PureTorque):
     def times(self, factor: float) -> Torque:
         return self if self.limit is None else replace(self, limit=times_each(self.limit, factor))
 
+    def metered(self, dimension: int) -> Actuator:
+        raise ValueError(
+            "least fuel with Torque counts no magnitude; use BallTorque(limit), of which the integral of the "
+            "magnitude is then least"
+        )
+
     def unlimited(self) -> Actuator:
         return Torque()
 

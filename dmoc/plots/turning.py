@@ -141,6 +141,11 @@ def draw_controls(axes: Any, solution: Solution, late: float, panel: tuple[str, 
         for level in np.unique(sides[np.isfinite(sides)]):
             if abs(level) <= 4 * largest:
                 axes.axhline(level / size, label="limit", **LIMIT)
+        if unit == "N m" and not np.isfinite(sides).any() and (limit := actuator.torque_limit()) is not None:
+            # The limit is one of the magnitude.
+            total = np.linalg.norm(control, axis=1) / size
+            axes.plot(times / late, total, color=DARK, linestyle=(0, (1, 1)), label="magnitude")
+            axes.axhline(limit / size, label="limit", **LIMIT)
     name = "torque" if unit == "N m" else "force"
     axes.set_ylabel(f"{name} [{shown}]")
     axes.set_title(f"{name.capitalize()} of the actuator" + (", held over each step" if solution.hold else ""))

@@ -43,6 +43,11 @@ def test_least_impulse_is_that_of_a_cart(tmp_path):
     assert verify(load(tmp_path / "fuel.nc"), problem).ok
 
 
+def test_least_fuel_of_a_torque_without_a_magnitude_is_refused():
+    with pytest.raises(ValueError, match="use BallTorque"):
+        turn(actuator=Torque(1.0), objective=Fuel())
+
+
 def test_least_effort_keeps_to_the_limit_on_the_magnitude():
     """Free, the torque is 6 J theta / T^2 at the ends; within a limit it costs more and stays at the limit."""
     free = solve(turn(actuator=Torque()), steps=40)
