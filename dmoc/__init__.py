@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 # The one list of public names, for type checkers and editors as for Python. Python itself imports a name
 # on its first use only, so that `dmoc --help` answers before CasADi is loaded.
 if TYPE_CHECKING:
+    from dmoc.bodies.ball_torques import BallTorque as BallTorque
     from dmoc.bodies.pointing import PointingKeepIn as PointingKeepIn
     from dmoc.bodies.pointing import PointingKeepOut as PointingKeepOut
     from dmoc.bodies.pointing import RateLimit as RateLimit

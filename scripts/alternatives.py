@@ -2,10 +2,12 @@
 
 Each is written as a practised user of CasADi would: scaled unknowns, one function of a node or a step,
 mapped, CasADi's own exact derivatives, Ipopt from a cold start. All but `plain` have position and
-velocity as states. They know transfers of fixed duration between two states, with effects, and with a
-force that is free or limited (FreeForce, BoxForce, BallForce).
+velocity as states, and of a body that turns its quaternion and rate, by dq/dt = q o w / 2 and Euler's
+equations: nothing but its own accuracy keeps the quaternion's length. They know transfers of fixed duration
+between two states, with effects, and with forces and torques that are free or limited.
 
     dmoc study orbit_raise --against scripts/alternatives.py --plot study.png
+    dmoc study reorientation --against scripts/alternatives.py
 
 A method takes (problem, steps) and returns a `dmoc.studies.accuracy.Formulation`; any file with a dictionary
 METHODS of such functions can stand in place of this one.
@@ -24,9 +26,9 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dmoc import State, TransferProblem
+from dmoc import Attitude, Pose, State, TransferProblem
+from dmoc.basics.quaternions import conjugate, normalised, times
 from dmoc.configurations.of_problem import configuration_of
-from dmoc.effects import Force
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics, specific_lagrangian
 from dmoc.motion.mesh import uniform_mesh
@@ -41,20 +43,27 @@ class Draft:
     """
 
     def __init__(self, problem: TransferProblem, steps: int):
-        two_states = isinstance(problem.start, State) and isinstance(problem.goal, State)
-        if not two_states or problem.free_duration or problem.constraints or problem.actuator.burns:
+        states = all(isinstance(end, (State, Pose, Attitude)) for end in (problem.start, problem.goal))
+        more = problem.free_duration or problem.constraints or problem.actuator.burns
+        if not states or more or problem.actuator.wheel_axes:
             raise ValueError(
                 "the alternatives know only transfers of fixed duration between two states, without "
-                "constraints or an engine; study another problem, or leave --against out"
+                "constraints, an engine or wheels; study another problem, or leave --against out"
             )
-        self.problem, self.steps, self.n, self.h = problem, steps, problem.dimension, 1 / steps
+        self.problem, self.steps, self.h = problem, steps, 1 / steps
+        self.dynamics, self.body = Dynamics.of(problem), configuration_of(problem)
+        # Numbers of coordinates, of velocities and of controls.
+        self.n, self.freedom, self.size = self.body.size, self.body.freedom, problem.controls
         self.duration = problem.duration_bounds[0]
         guess = starting_guess(problem, uniform_mesh(min(max(steps, 100), 2000)), 2, False)
-        self.units = units_of(problem, guess)
-        self.scale = np.repeat([self.units.length, self.units.length / self.duration], self.n)
-        self.origin = np.concatenate([self.units.origin, np.zeros(self.n)])
-        clamped = tuple((1, v * self.duration) for v in (guess.start_velocity, guess.goal_velocity))
-        self._path = CubicSpline(guess.fractions, guess.position, bc_type=clamped)
+        self.units, made = units_of(problem, guess), self.body.coordinates
+        length, attitudes = self.units.length, [1.0, 0.0]
+        self.scale = np.append(made.sized(length, *attitudes), made.paced(length, *attitudes) / self.duration)
+        self.push = np.array([self.units.of(unit) for unit in problem.actuator.units(problem.dimension)])
+        self.origin = np.concatenate([self.units.origin, np.zeros(self.freedom)])
+        ends = zip(guess.position[[0, -1]], (guess.start_velocity, guess.goal_velocity), strict=True)
+        slopes = [self.dynamics.to_slopes(*end).full().ravel() * self.duration for end in ends]
+        self._path = CubicSpline(guess.fractions, guess.position, bc_type=tuple((1, slope) for slope in slopes))
         self._unknowns: list[tuple] = []
 
     def time(self, fraction):
@@ -69,35 +78,53 @@ class Draft:
 
     def states(self, fractions: np.ndarray, entries: slice = slice(None)) -> ca.MX:
         """States, or some of their entries, of which the first and the last are those of the problem."""
-        found = np.hstack([self._path(fractions), self._path(fractions, 1) / self.duration])
+        found = self._guessed(fractions)
         guess = ((found - self.origin) / self.scale).T
         lower, upper = np.full_like(guess, -np.inf), np.full_like(guess, np.inf)
         for place, end in ((0, self.problem.start), (-1, self.problem.goal)):
-            known = (np.concatenate(end.fixed()) - self.origin) / self.scale
+            state = np.concatenate(end.fixed())
+            for at in self.body.coordinates.quaternions if place else []:
+                # Three entries of a quaternion that keeps its length are enough; a fourth is a row too many.
+                state[at.start + np.argmax(np.abs(state[at]))] = np.nan
+            known = (state - self.origin) / self.scale
             lower[:, place], upper[:, place] = (
                 np.nan_to_num(known, nan=-np.inf),
                 np.nan_to_num(known, nan=np.inf),
             )
         return self.unknown("s", guess[entries], lower[entries], upper[entries])
 
+    def _guessed(self, fractions: np.ndarray) -> np.ndarray:
+        """Coordinates and velocities of the guess, a row each."""
+        q, slopes = self._path(fractions), self._path(fractions, 1) / self.duration
+        parts = [slopes[:, self.body.coordinates.places]]
+        for at in self.body.coordinates.quaternions:
+            q[:, at] = normalised(q[:, at])
+            parts.append(2 * times(conjugate(q[:, at]), slopes[:, at])[:, 1:])
+        return np.hstack([q, *parts])
+
     def forces(self, count: int) -> ca.MX:
-        low, high = (side[:, None] / self.units.force for side in self.problem.actuator.bounds(self.n))
-        return self.unknown("u", np.zeros((self.n, count)), low, high)
+        low, high = (
+            side[:, None] / self.push[:, None] for side in self.problem.actuator.bounds(self.problem.dimension)
+        )
+        return self.unknown("u", np.zeros((self.size, count)), low, high)
 
     def rates(self) -> ca.Function:
         """(fraction, state, force) -> change of the state and running cost, both a fraction of the duration."""
-        tau, s, u = ca.SX.sym("tau"), ca.SX.sym("s", 2 * self.n), ca.SX.sym("u", self.n)
-        problem, state, force = self.problem, s * self.scale + self.origin, u * self.units.force
-        t, q, v, m = self.time(tau), state[: self.n], state[self.n :], problem.mass
-        push = Dynamics.of(problem).acceleration(t, q, v, m, force)
-        cost = problem.objective.sense * problem.objective.rate(problem.actuator, t, q, v, force, m)
+        tau, s, u = ca.SX.sym("tau"), ca.SX.sym("s", self.n + self.freedom), ca.SX.sym("u", self.size)
+        problem, state, force = self.problem, s * self.scale + self.origin, u * self.push
+        t, q, w, m = self.time(tau), state[: self.n], state[self.n :], problem.mass
+        push = self.dynamics.acceleration(t, q, w, m, self.dynamics.wrench(q, force))
+        v = self.body.velocity(q, w)
+        seen = self.body.body(q, v)
+        rate = problem.objective.rate(problem.actuator, t, seen.position, seen.velocity, force, m)
+        cost = problem.objective.sense * rate
         outputs = [self.duration * ca.vertcat(v, push) / self.scale, self.duration * cost / self.units.cost]
         return ca.Function("rates", [tau, s, u], outputs)
 
     def limits(self, forces: ca.MX) -> tuple[ca.MX, np.ndarray, np.ndarray]:
         """Rows that keep every force within a limit that is not a bound, and their bounds."""
-        u = ca.SX.sym("u", self.n)
-        rows = self.problem.actuator.rows(u * self.units.force)
+        u = ca.SX.sym("u", self.size)
+        rows = self.problem.actuator.rows(u * self.push)
         function = ca.Function("limit", [u], [ca.vertcat(ca.SX(0, 1), *[row.expression for row in rows])])
         count, lower, upper = forces.shape[1], [row.lower for row in rows], [row.upper for row in rows]
         values = ca.vec(function.map(count)(forces)) if rows else ca.MX(0, 1)
@@ -106,7 +133,10 @@ class Draft:
     def formulation(self, defects: ca.MX, cost: ca.MX, ends: ca.MX, forces: ca.MX, points) -> Formulation:
         """The NLP; `ends` are the first and last state, side by side."""
         problem, last = self.problem, ends[:, 1] * self.scale + self.origin
-        at_goal = (self.time(1.0), last[: self.n], last[self.n :], problem.mass)
+        places, speeds = (
+            np.flatnonzero(mask) for mask in (self.body.coordinates.places, self.body.coordinates.speeds)
+        )
+        at_goal = (self.time(1.0), last[places], last[self.n + speeds], problem.mass)
         terminal = problem.objective.sense * problem.objective.terminal(*at_goal) / self.units.cost
         limits, low, high = self.limits(forces)
         symbols, guess, lower, upper = zip(*self._unknowns, strict=True)
@@ -120,7 +150,7 @@ class Draft:
             row_bounds=(np.append(zeros, low), np.append(zeros, high)),
             objective_unit=problem.objective.sense * self.units.cost,
             ends=ends * self.scale + self.origin,
-            controls=forces * self.units.force,
+            controls=forces * self.push,
             points=points,
         )
 
@@ -142,7 +172,11 @@ def rk4_shooting(problem: TransferProblem, steps: int, hold: bool = False) -> Fo
     """
     draft = Draft(problem, steps)
     at, h, rates = np.linspace(0, 1, steps + 1), draft.h, draft.rates()
-    tau, before, f = ca.SX.sym("tau"), ca.SX.sym("s", 2 * draft.n), ca.SX.sym("u", draft.n, 1 if hold else 3)
+    tau, before, f = (
+        ca.SX.sym("tau"),
+        ca.SX.sym("s", len(draft.scale)),
+        ca.SX.sym("u", draft.size, 1 if hold else 3),
+    )
     first, middle, last = (f, f, f) if hold else ca.horzsplit(f)
     k1, c1 = rates(tau, before, first)
     k2, c2 = rates(tau + h / 2, before + h / 2 * k1, middle)
@@ -190,44 +224,71 @@ def radau(problem: TransferProblem, steps: int, degree: int) -> Formulation:
 
 
 def plain(problem: TransferProblem, steps: int) -> Formulation:
-    """Equation (16) as it is written down, over three neighbouring positions: dmoc's own scheme of order 2."""
+    """Equation (16) as it is written down, over three neighbouring positions: dmoc's own scheme of order 2.
+
+    Of a body that turns the rows are those of Manchester and Peck, and each quaternion keeps its length by one
+    more.
+    """
     draft = Draft(problem, steps)
     at, n, h = np.linspace(0, 1, steps + 1), draft.n, draft.h
     q, v = draft.states(at, slice(n)), draft.states(np.array([0.0, 1.0]), slice(n, None))
     u = draft.forces(steps + 1)
-    momenta, at_rest = _momenta(draft), ca.DM(n, steps + 1)
-    kick = h * draft.units.force * draft.duration / problem.mass / draft.scale[-1]
-    tau, *three, f = ca.SX.sym("tau"), *(ca.SX.sym(name, n) for name in ("before", "here", "after", "f"))
-    row = momenta(tau - h, *three[:2], at_rest[:, 0])[1] - momenta(tau, *three[1:], at_rest[:, 0])[0] + kick * f
+    momenta, kick = _momenta(draft), _kick(draft)
+    tau, f = ca.SX.sym("tau"), ca.SX.sym("f", draft.size)
+    three, still = [ca.SX.sym(name, n) for name in ("before", "here", "after")], ca.DM(draft.freedom, 1)
+    passing = momenta(tau - h, *three[:2], still)[1] - momenta(tau, *three[1:], still)[0]
+    row = ca.vertcat(passing + kick(three[1], f), draft.body.g(three[1]))
     inside = ca.Function("inside", [tau, *three, f], [ca.cse(row)]).map(steps - 1)
     rows = inside(at[None, 1:-1], q[:, :-2], q[:, 1:-1], q[:, 2:], u[:, 1:-1])
     leaving, _, start = momenta(0.0, q[:, 0], q[:, 1], v[:, 0])
     _, arriving, _ = momenta(1.0 - h, q[:, -2], q[:, -1], v[:, 1])
     goal = momenta(1.0, q[:, -1], q[:, -1], v[:, 1])[2]
-    defects = [start - leaving + 0.5 * kick * u[:, 0], rows, arriving - goal + 0.5 * kick * u[:, -1]]
-    _, cost = draft.rates().map(steps + 1)(at[None], ca.vertcat(q, at_rest), u)
+    length = ca.Function("length", [three[0]], [draft.body.g(three[0])])
+    first = start - leaving + 0.5 * kick(q[:, 0], u[:, 0])
+    last = arriving - goal + 0.5 * kick(q[:, -1], u[:, -1])
+    defects = ca.vertcat(first, ca.vec(rows), last, length(q[:, -1]))
+    _, cost = draft.rates().map(steps + 1)(at[None], ca.vertcat(q, ca.DM(draft.freedom, steps + 1)), u)
     ends = ca.vertcat(q[:, [0, steps]], v)
-    return draft.formulation(ca.horzcat(*defects), cost * weights(steps, (0.5, 0.5)), ends, u, (0.0, 1.0))
+    return draft.formulation(defects, cost * weights(steps, (0.5, 0.5)), ends, u, (0.0, 1.0))
+
+
+def _kick(draft: Draft) -> ca.Function:
+    """(q, u) -> what the controls of a node give in the time of a step, in the units of `_momenta`."""
+    q, u = ca.SX.sym("q", draft.n), ca.SX.sym("u", draft.size)
+    wrench = draft.dynamics.wrench(q * draft.scale[: draft.n] + draft.origin[: draft.n], u * draft.push)
+    given = draft.h * draft.duration * wrench / draft.problem.mass / draft.scale[draft.n :]
+    return ca.Function("kick", [q, u], [given])
 
 
 def _momenta(draft: Draft) -> ca.Function:
-    """(fraction, q0, q1, v) -> momenta that leave q0 and arrive at q1 in a step, and that of (q0, v)."""
-    n, problem, (length, speed) = draft.n, draft.problem, draft.scale[[0, -1]]
-    tau, q0, q1, v = ca.SX.sym("tau"), *(ca.SX.sym(name, n) for name in ("q0", "q1", "v"))
-    ends = [(draft.time(at), q * length + draft.units.origin) for at, q in ((tau, q0), (tau + draft.h, q1))]
-    h, m, velocity = draft.h * draft.duration, problem.mass, speed * (q1 - q0) / draft.h
-
-    def lagrangian(t, q, v):
-        return 0.5 * ca.dot(v, v) + specific_lagrangian(problem.effects, configuration_of(problem), t, q, v, m)
-
-    working = [effect for effect in problem.effects if isinstance(effect, Force)]
-    pushes = [0.5 * h / m * sum(e.force(t, q, velocity, m) for e in working) for t, q in ends]
-    action = 0.5 * h * sum(lagrangian(t, q, velocity) for t, q in ends)
-    leaving, arriving = (
-        ca.gradient(action, q) / length + push for q, push in zip((q0, q1), pushes, strict=True)
+    """(fraction, q0, q1, w) -> momenta that leave q0 and arrive at q1 in a step, and that of (q0, w)."""
+    n, problem, body = draft.n, draft.problem, draft.body
+    tau, q0, q1, w = (
+        ca.SX.sym("tau"),
+        *(ca.SX.sym(name, n) for name in ("q0", "q1")),
+        ca.SX.sym("w", draft.freedom),
     )
-    resting = ca.gradient(lagrangian(*ends[0], speed * v), v) / speed
-    return ca.Function("momenta", [tau, q0, q1, v], [-leaving / speed, arriving / speed, resting / speed])
+    times_at = draft.time(tau), draft.time(tau + draft.h)
+    places = [q * draft.scale[:n] + draft.origin[:n] for q in (q0, q1)]
+    here = [ca.SX.sym(name, n) for name in ("here", "there")]
+    h, m, slope = draft.h * draft.duration, problem.mass, (here[1] - here[0]) / (draft.h * draft.duration)
+
+    def potentials(t, q, v):
+        return specific_lagrangian(problem.effects, body, t, q, v, m)
+
+    def pushed(t, q):
+        acts = [effect.wrench_of(t, body.body(q, slope), m) for effect in problem.effects]
+        return sum(0.5 * h / m * body.generalised(q, *act) for act in acts if act != (None, None))
+
+    ends = list(zip(times_at, here, strict=True))
+    action = h * body.kinetic(here[0], slope, m) + 0.5 * h * sum(potentials(t, q, slope) for t, q in ends)
+    leaving, arriving = (body.along(q, ca.gradient(action, q) + pushed(t, q)) for t, q in ends)
+    v = ca.SX.sym("v", n)
+    moving = ca.gradient(body.kinetic(here[0], v, m) + potentials(times_at[0], here[0], v), v)
+    resting = body.along(here[0], ca.substitute(moving, v, body.velocity(here[0], w * draft.scale[n:])))
+    speed = draft.scale[n:]
+    found = ca.substitute([-leaving / speed, arriving / speed, resting / speed], here, places)
+    return ca.Function("momenta", [tau, q0, q1, w], found)
 
 
 def weights(steps: int, shares: tuple) -> np.ndarray:

@@ -21,7 +21,7 @@ class Thrusters(OnBody, Burner):
     """Thrusters fixed to the body, each with a thrust between 0 and its largest.
 
     The force in body axes is sum_i u_i d_i, the torque about the centre of mass sum_i u_i r_i x d_i. Where they
-    burn propellant, the inertia shrinks in proportion to the mass and the centre of mass stays where it is.
+    burn propellant, the centre of mass stays where it is.
 
     Parameters
     ----------
@@ -35,6 +35,11 @@ class Thrusters(OnBody, Burner):
         Whether each can push against its direction, too.
     specific_impulse, exhaust_velocity, dry_mass
         As for `Engine`.
+    inertia_law : "scaled" or "constant"
+        While they burn, the inertia shrinks in proportion to the mass, as where propellant is spread like the
+        rest of the body, or stays what it is, as where the tank is at the centre of mass. Either way Euler's
+        equation is J dw/dt + w x J w = tau: what leaves the body takes its own angular momentum along. Angular
+        momenta per unit mass, as `spin` is, are per start mass where the inertia stays.
     """
 
     positions: Sequence[Vector] | np.ndarray
@@ -44,6 +49,7 @@ class Thrusters(OnBody, Burner):
     specific_impulse: float | None = None
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
+    inertia_law: str = "scaled"
     limit_label = "limit of\na thruster"
 
     def __post_init__(self) -> None:
@@ -59,6 +65,9 @@ class Thrusters(OnBody, Burner):
         checked(self, positions=places, directions=units, both_ways=flag("both_ways", self.both_ways))
         self._check_thrust(len(units))
         self._check_exhaust(self.specific_impulse)
+        if self.inertia_law not in ("scaled", "constant"):
+            given = short(self.inertia_law)
+            raise ValueError(f"Thrusters: inertia_law must be 'scaled' or 'constant'; got {given}")
         if self.burns and self.both_ways:
             raise ValueError("Thrusters: those that burn push one way; state each way as a thruster of its own")
 
@@ -141,7 +150,9 @@ class Thrusters(OnBody, Burner):
     def words(self) -> str:
         most = "without a limit" if self.max_thrust is None else f"of at most {self.force_limit():g} N"
         ways = " both ways" if self.both_ways else ""
-        return f"{len(self.directions)} thrusters fixed to the body, {most}{ways}{self._burning_words()}"
+        law = {"scaled": "the inertia shrinks with the mass", "constant": "the inertia stays"}[self.inertia_law]
+        burning = self._burning_words() + (f", {law}" if self.burns else "")
+        return f"{len(self.directions)} thrusters fixed to the body, {most}{ways}{burning}"
 
 
 def _rows(name: str, value: Any, unit: str) -> tuple[tuple[float, ...], ...]:

@@ -24,26 +24,11 @@ class OnBody(Actuator):
         return ca.dot(u, u)
 
 
-@dataclass(frozen=True)
-class Torque(OnBody):
-    """A torque in body axes, about the centre of mass: |tau_i| <= limit_i, or without a limit.
+class PureTorque(OnBody):
+    """What actuators share whose controls are a torque in body axes."""
 
-    Parameters
-    ----------
-    limit : float or sequence of float, optional
-        Largest torque [N m], one number or one for each body axis; none if not given.
-    """
-
-    limit: float | Vector | None = None
     effort_unit: ClassVar[str] = "N^2 m^2 s"
-
-    def __post_init__(self) -> None:
-        if self.limit is not None:
-            checked(self, limit=_three("Torque: limit", self.limit, "N m"))
-
-    @property
-    def structure(self) -> tuple:
-        return type(self), self.limit is None
+    meter_unit: ClassVar[str] = "N m s"
 
     def size(self, dimension: int) -> int:
         return AXES
@@ -52,23 +37,13 @@ class Torque(OnBody):
         return ("tx", "ty", "tz")
 
     def units(self, dimension: int) -> tuple[str, ...]:
-        return ("N m",) * AXES
+        return ("N m",) * self.size(dimension)
 
     def force(self, u: Any) -> Any:
         return u
 
     def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
-        return None, u
-
-    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        limit = np.broadcast_to(np.inf if self.limit is None else np.asarray(self.limit), (AXES,)).astype(float)
-        return -limit, limit
-
-    def torque_limit(self) -> float | None:
-        return None if self.limit is None else float(np.max(self.limit))
-
-    def times(self, factor: float) -> Torque:
-        return self if self.limit is None else replace(self, limit=times_each(self.limit, factor))
+        return None, self.force(u)
 
     @property
     def limit_words(self) -> str:
@@ -82,14 +57,51 @@ class Torque(OnBody):
         enough = up(eased.torque_limit() or 0.0)
         return f"a torque limit of {enough} N m (you gave {self.torque_limit():g} N m)"
 
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        return value * (self.torque_limit() or 1.0), "N m"
+
+
+@dataclass(frozen=True)
+class Torque(PureTorque):
+    """A torque in body axes, about the centre of mass: |tau_i| <= limit_i, or without a limit.
+
+    Parameters
+    ----------
+    limit : float or sequence of float, optional
+        Largest torque [N m], one number or one for each body axis; none if not given.
+    """
+
+    limit: float | Vector | None = None
+
+    def __post_init__(self) -> None:
+        if self.limit is not None:
+            checked(self, limit=_three("Torque: limit", self.limit, "N m"))
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.limit is None
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        limit = np.broadcast_to(np.inf if self.limit is None else np.asarray(self.limit), (AXES,)).astype(float)
+        return -limit, limit
+
+    def torque_limit(self) -> float | None:
+        return None if self.limit is None else float(np.max(self.limit))
+
+    def times(self, factor: float) -> Torque:
+        return self if self.limit is None else replace(self, limit=times_each(self.limit, factor))
+
+    def metered(self, dimension: int) -> Actuator:
+        raise ValueError(
+            "least fuel with Torque counts no magnitude; use BallTorque(limit), of which the integral of the "
+            "magnitude is then least"
+        )
+
     def unlimited(self) -> Actuator:
         return Torque()
 
     def share(self, u: np.ndarray) -> float:
         return 0.0 if self.limit is None else float((np.abs(u) / np.asarray(self.limit)).max(initial=0.0))
-
-    def violation(self, value: float, unit: str) -> tuple[float, str]:
-        return value * (self.torque_limit() or 1.0), "N m"
 
     def words(self) -> str:
         limit = "without a limit" if self.limit is None else f"of at most {_listed(self.limit)} N m about each"

@@ -7,6 +7,7 @@ import numpy as np
 
 from dmoc.basics.quaternions import rotated
 from dmoc.checks.evidence import Evidence
+from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.motion.dynamics import specific_lagrangian, state_symbols
 from dmoc.motion.march import wrench_of
 from dmoc.motion.momenta import along_path, rates_along
@@ -52,8 +53,9 @@ def _held(evidence: Evidence) -> np.ndarray:
     """What a held control does per unit mass at each node of its step, shape (s+1, steps, freedom)."""
     return np.array(
         [
-            wrench_of(evidence.dynamics, evidence.position[at], evidence.path.control)
-            / evidence.mass[at][:, None]
+            evidence.per_mass(
+                wrench_of(evidence.dynamics, evidence.position[at], evidence.path.control), evidence.mass[at]
+            )
             for at in evidence.at
         ]
     )
@@ -69,12 +71,16 @@ def energy_gap(evidence: Evidence) -> float | None:
         return None
     if ca.depends_on(potential, t) or (evidence.dynamics.actuator.burns and ca.depends_on(potential, m)):
         return None
+    attitude = q[np.flatnonzero(evidence.path.coordinates.kinds == ATTITUDE)]
+    if body.turning_share(2.0) != 1 and ca.depends_on(potential, attitude):
+        # A potential per unit mass does work on the turn per start mass.
+        return None
     at = [(evidence.time[i], evidence.position[i], evidence.velocity[i], evidence.mass[i]) for i in (0, -1)]
     change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
     push = evidence.loads[1]
     rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
     if not evidence.path.hold:
-        power = (evidence.wrench / evidence.mass[:, None] + push) * rates
+        power = (evidence.per_mass(evidence.wrench, evidence.mass) + push) * rates
         parts = np.sum(power, axis=1) * evidence.weights
     elif body.surplus:
         # A held force that is fixed to a turning body turns with it within a step.

@@ -107,6 +107,11 @@ class Evidence:
         pull, work = (along_path(self.dynamics, self.position, part) for part in parts)
         return pull, work
 
+    def per_mass(self, wrench: np.ndarray | float, mass: np.ndarray) -> np.ndarray:
+        """Forces and torques, one row a place, per unit mass [m/s^2], [m^2/s^2]."""
+        share = np.ones_like(mass) * self.dynamics.configuration.turning_share(mass)
+        return wrench / mass[:, None] * np.where(self.rates, share[:, None], 1.0)
+
     @property
     def pulls(self) -> np.ndarray:
         """Accelerations by potentials and by other effects at every node, shape (nodes, 2 axes) [m/s^2]."""

@@ -145,7 +145,7 @@ def _residual(evidence: Evidence) -> Check:
 
     In units of length the same row would be h^2 / m times smaller and hide its error.
     """
-    defect = np.abs(evidence.rows) * (evidence.mass / evidence.weights)[:, None]
+    defect = np.abs(evidence.rows) / evidence.weights[:, None] / evidence.per_mass(1.0, evidence.mass)
     actuator, mass = evidence.problem.actuator, evidence.mass.max()
     scene = np.max(
         [mass * np.abs(evidence.pulls).max(initial=0.0), mass * evidence.speed / evidence.path.duration]

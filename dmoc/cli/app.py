@@ -69,13 +69,15 @@ def list_problems() -> None:
 
 @app.command(epilog="Example: dmoc show free_flyer")
 def show(name: Name, settings: Settings = None) -> None:
-    """Say what a problem is: the scene, its parameters, the size of its NLP."""
-    from dmoc.nlp.transcription import transcribe
+    """Say what a problem is: the scene, its parameters, the size of its NLP as solved without options."""
+    from dmoc.nlp.transcription import transcribe_onto
+    from dmoc.nlp.units import units_of
     from dmoc.reports import words as report
-    from dmoc.solver.meshes import DEFAULT_STEPS
+    from dmoc.solver.meshes import first_path
 
     file, problem = problem_of(name, settings)
-    nlp = transcribe(problem, DEFAULT_STEPS[2])
+    guess = first_path(problem)
+    nlp = transcribe_onto(problem, guess, units_of(problem, guess))
     console = report.console()
     tables = (report.scene(problem), report.parameters(file.parameters), report.sizes(nlp))
     for part in (report.prose(file.docstring), *tables):

@@ -147,12 +147,12 @@ class Configuration(ABC):
         return self.tangent(q) @ w if self.surplus else w
 
     @abstractmethod
-    def body(self, q: Any, v: Any) -> Body:
-        """The body as effects see it."""
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
+        """The body as effects see it, at a mass where its inertia hangs on it."""
 
     def members(self, q: Any, v: Any, m: Any) -> list[tuple[str, Body, Any]]:
         """Name, state and mass of each body; the name of an only body is empty."""
-        return [("", self.body(q, v), m)]
+        return [("", self.body(q, v, m), m)]
 
     def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
         """The column of the size of q by which a force [N] and a torque in body axes [N m] act on one body."""
@@ -164,6 +164,18 @@ class Configuration(ABC):
 
         They are a force [N], a torque in body axes [N m] and the torques on reaction wheels [N m].
         """
+
+    def turning_share(self, m: Any) -> Any:
+        """What a torque counts per unit mass, times m: 1 where the inertia per unit mass stays the same."""
+        return 1
+
+    def shared(self, column: Any, m: Any) -> Any:
+        """A column of forces per unit mass with its torques times `turning_share`."""
+        return column
+
+    def driven(self, actuator: Any, q: Any, u: Any, m: Any) -> Any:
+        """What an actuator does to the coordinates per unit mass [m/s^2], [m^2/s^2]."""
+        return self.shared(actuator.acts(self, q, u) / m, m)
 
     def rotation(self, q: Any) -> Any:
         """R(q), which turns body axes into space axes; None for a body without an attitude."""
@@ -195,7 +207,7 @@ class Translation(Configuration):
         # The gradient of v . v / 2 would be written with a multiplication for each axis.
         return 0, v
 
-    def body(self, q: Any, v: Any) -> Body:
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
         return Body(q, v)
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:

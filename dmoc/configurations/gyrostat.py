@@ -77,8 +77,8 @@ class Gyrostat(RigidBody):
         spin = 4 / h * (self._per_mass(m) @ turned) + 2 * total / m
         return [ca.vertcat(-along, -columns_of(last) @ spin), ca.vertcat(along, columns_of(first) @ spin)]
 
-    def body(self, q: Any, v: Any) -> Body:
-        return super().body(q, v)._replace(wheels=v[self.axes : self.before])
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
+        return super().body(q, v, m)._replace(wheels=v[self.axes : self.before])
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         rigid = super().generalised(q, force, torque)

@@ -90,8 +90,14 @@ class Linked(Configuration):
     def tangent(self, q: Any) -> Any:
         return self.free.tangent(q)
 
-    def body(self, q: Any, v: Any) -> Body:
-        return self.free.body(q, v)
+    def turning_share(self, m: Any) -> Any:
+        return self.free.turning_share(m)
+
+    def shared(self, column: Any, m: Any) -> Any:
+        return self.free.shared(column, m)
+
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
+        return self.free.body(q, v, m)
 
     def members(self, q: Any, v: Any, m: Any) -> list[tuple[str, Body, Any]]:
         return self.free.members(q, v, m)
@@ -101,6 +107,12 @@ class Linked(Configuration):
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         return self.free.generalised(q, force, torque, spun)
+
+    def turning_share(self, m: Any) -> Any:
+        return self.free.turning_share(m)
+
+    def shared(self, column: Any, m: Any) -> Any:
+        return self.free.shared(column, m)
 
     def rotation(self, q: Any) -> Any:
         return self.free.rotation(q)

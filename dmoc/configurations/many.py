@@ -101,7 +101,7 @@ class Many(Configuration):
     def tangent(self, q: Any) -> Any:
         return ca.diagcat(*[part.tangent(qs) for part, qs in zip(self.parts, self.cut(q), strict=True)])
 
-    def body(self, q: Any, v: Any) -> Body:
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
         each = self.members(q, v, 1.0)
         place, speed = (
             sum(share * getattr(body, name) for share, (_, body, _) in zip(self.shares, each, strict=True))

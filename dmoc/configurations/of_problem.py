@@ -34,7 +34,9 @@ def _free(problem: Any) -> Configuration:
         return Many(tuple(body.name for body in bodies), parts, shares)
     if problem.inertia is None:
         return Translation(problem.dimension)
-    start_mass = problem.mass if problem.actuator.burns else None
+    actuator = problem.actuator
+    start_mass = problem.mass if actuator.burns else None
     of_body = problem.inertia, problem.dimension if problem.start.has_position else 0, start_mass
-    wheels = problem.actuator.wheel_axes
-    return Gyrostat(*of_body, wheels) if wheels else RigidBody(*of_body)
+    constant = actuator.burns and actuator.inertia_law == "constant"
+    wheels = actuator.wheel_axes
+    return Gyrostat(*of_body, constant, wheels) if wheels else RigidBody(*of_body, constant)

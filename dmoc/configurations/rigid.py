@@ -29,11 +29,14 @@ class RigidBody(Configuration):
         3 with a position, 0 for the attitude alone.
     start_mass : float, optional
         Where propellant burns, the mass that has this inertia [kg]: it shrinks in proportion to the mass.
+    constant : bool
+        It does not shrink. Turning is then described per start mass, moving per mass.
     """
 
     moments: tuple[tuple[float, ...], ...]
     axes: int = 3
     start_mass: float | None = None
+    constant: bool = False
 
     @property
     def before(self) -> int:
@@ -99,9 +102,19 @@ class RigidBody(Configuration):
     def tangent(self, q: Any) -> Any:
         return ca.diagcat(ca.DM.eye(self.before), 0.5 * columns_of(q[self.before :]))
 
-    def body(self, q: Any, v: Any) -> Body:
+    def body(self, q: Any, v: Any, m: Any = None) -> Body:
         attitude, _, linear, rate = self._split(q, v)
-        return Body(q[: self.axes], linear, attitude, self.rotation(q), rate, self.matrix)
+        shrinks = self.start_mass is not None and not self.constant and m is not None
+        inertia = self._per_mass(m) * m if shrinks else self.matrix
+        return Body(q[: self.axes], linear, attitude, self.rotation(q), rate, inertia)
+
+    def turning_share(self, m: Any) -> Any:
+        return m / self.start_mass if self.constant and self.start_mass is not None else 1
+
+    def shared(self, column: Any, m: Any) -> Any:
+        if not self.constant:
+            return column
+        return ca.vertcat(column[: self.before], self.turning_share(m) * column[self.before :])
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         zeros = ca.SX.zeros(self.axes), ca.SX.zeros(QUATERNION)

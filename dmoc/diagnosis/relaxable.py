@@ -231,10 +231,13 @@ class Relaxable:
     def leaps(self, path: DiscretePath) -> bool:
         """Whether a path leaps across a zone between two nodes, where no row stops a large enough force."""
         inside = np.linspace(0, 1, 9)[1:-1, None, None]
-        chords = (1 - inside) * path.place[:-1] + inside * path.place[1:]
-        chords = chords.reshape(chords.shape[0] * chords.shape[1], chords.shape[2])
-        zones = [zone for zone in self.problem.constraints if np.isfinite(zone.feature())]
-        return any((zone.excess(chords, chords) > LEAP * zone.feature()).any() for zone in zones)
+        for zone in self.problem.constraints:
+            if np.isfinite(zone.feature()):
+                place = path.place_of(zone)
+                chords = ((1 - inside) * place[:-1] + inside * place[1:]).reshape(-1, place.shape[1])
+                if (zone.excess(chords, chords) > LEAP * zone.feature()).any():
+                    return True
+        return False
 
     def _groups(self) -> tuple[Group, ...]:
         return self.nlp.rows.groups

@@ -61,8 +61,8 @@ class Body(NamedTuple):
         R(q), shape (3, 3), which turns body axes into space axes; a polynomial in the quaternion.
     rate : column or None
         Angular rate in body axes [rad/s].
-    inertia : array or None
-        In body axes about the centre of mass [kg m^2], shape (3, 3).
+    inertia : array, column or None
+        In body axes about the centre of mass [kg m^2], shape (3, 3); for CasADi where it shrinks with the mass.
     wheels : column or None
         Angular momenta of its reaction wheels about their axes [N m s].
     """

@@ -69,11 +69,9 @@ class GravityGradient(BodyConservative):
             position = as_column(self.place(t)) if callable(self.place) else ca.DM(self.place)
         offset = position - ca.DM(self.center)
         radius = ca.sqrt(ca.dot(offset, offset))
-        inertia = ca.DM(np.asarray(body.inertia))
+        inertia = body.inertia if isinstance(body.inertia, ca.SX) else ca.DM(np.asarray(body.inertia))
         seen = body.rotation.T @ offset
-        pull = np.trace(np.asarray(body.inertia)) / (2 * radius**3) - 3 * ca.dot(seen, inertia @ seen) / (
-            2 * radius**5
-        )
+        pull = ca.trace(inertia) / (2 * radius**3) - 3 * ca.dot(seen, inertia @ seen) / (2 * radius**5)
         return self.mu * pull / m
 
 

@@ -41,8 +41,8 @@ An attitude is a unit quaternion from body axes to space axes, scalar first; q a
 solver takes the sign that its guess has. A rate is in body axes [rad/s]. `residual_torque` [N m] is in body
 axes, too, and `residual_norm` is q.q - 1. A plan whose `largest_turn` between neighbouring nodes is not far
 below pi/2 is wrong, whatever its status: it has too few steps, or a guess that changes sign. `reactions` keep
-quaternions unit ones and move nothing. The inertia is fixed; where propellant burns it is in proportion to the
-mass, and is what the problem states at the problem's own mass.
+quaternions unit ones and move nothing. The inertia is fixed; where propellant burns and the thrusters' law is
+not "constant", it is in proportion to the mass, and is what the problem states at the problem's own mass.
 """
 
 CODE = """

@@ -85,7 +85,14 @@ def _defect(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     ends = ca.horzcat(2 * ends[:, 0], ends[:, 1:])
     inner = [_scaled_rows(parts[j], masses[j] / weight[j], n) for j in range(1, rule.degree)]
     rows = ca.reshape(ca.vertcat(ends, *inner), n, scene.nodes - 1) if inner else ends
-    return ca.horzcat(rows, (parts[-1][:, -1] - finish) * last_mass / weight[0])
+    rows = ca.horzcat(rows, (parts[-1][:, -1] - finish) * last_mass / weight[0])
+    body = scene.dynamics.configuration
+    share = body.turning_share(path["masses"]) if scene.burns else 1
+    if isinstance(share, int):
+        return rows
+    # Where the inertia stays while propellant burns, turning is described per start mass.
+    turning = ca.DM(body.coordinates.rates.astype(float))
+    return rows / (ca.repmat(1 - turning, 1, scene.nodes) + turning @ share)
 
 
 def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:

@@ -19,7 +19,7 @@ SAME_WAY = 0.05
 def ways_past(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, DiscretePath]]:
     """Names and paths, each bent past one zone on one of its sides."""
     for i, constraint in enumerate(problem.constraints):
-        for way, bend in constraint.ways_round(base.place, base.fractions):
+        for way, bend in constraint.ways_round(base.place_of(constraint), base.fractions):
             yield f"{way} of {type(constraint).__name__} {i + 1}", base.moved(bend)
 
 
@@ -48,8 +48,9 @@ def _past_the_others(
     times = problem.start_time + base.duration * base.fractions
     zones = [zone for zone in problem.constraints if not zone.turns_body]
     for _ in range(BENDS_A_ZONE * len(zones)):
-        deep = [float(zone.excess_at(times, path.place, still).max()) for zone in zones]
-        bends = zones[int(np.argmax(deep))].ways_round(path.place, path.fractions)
+        deep = [float(zone.excess_at(times, path.place_of(zone), still).max()) for zone in zones]
+        deepest = zones[int(np.argmax(deep))]
+        bends = deepest.ways_round(path.place_of(deepest), path.fractions)
         ways = [bend for _, bend in bends]
         if max(deep) <= 0 or not ways:
             return path, max(deep) <= 0

@@ -98,7 +98,7 @@ def as_point(problem: TransferProblem) -> TransferProblem:
         effects=[effect for effect in problem.effects if not effect.turns_body],
         actuator=FreeForce() if limit is None else BallForce(limit),
         objective=Effort(),
-        constraints=[constraint for constraint in problem.constraints if not constraint.turns_body],
+        constraints=[one for one in problem.constraints if not one.turns_body and one.point is None],
         start_time=problem.start_time,
     )
 
@@ -179,4 +179,9 @@ def turning_guess(
     velocities = [np.where(np.isnan(fixed), guessed, fixed) for _, (_, fixed), guessed in ends]
     mass = np.full(len(position), problem.mass)
     on_mesh = mesh, order, hold, duration, position, control, mass
-    return DiscretePath(*on_mesh, velocities[0], velocities[1], made_of=body.coordinates)
+    path = DiscretePath(*on_mesh, velocities[0], velocities[1], made_of=body.coordinates)
+    for zone in problem.constraints:
+        if zone.point is not None and given is None:
+            seen = path.place_of(zone)
+            path = path.moved(zone.off_centre(seen, fractions) - seen)
+    return path

@@ -150,7 +150,7 @@ class Dynamics:
         inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
         pulled = dldq + push
         along = ca.solve(inertia, pulled[:axes] + f[:axes] / m - change) if axes else ca.SX.zeros(0)
-        torque = body.along(q, pulled)[before:] + f[before:] / m
+        torque = body.along(q, pulled)[before:] + body.turning_share(m) * f[before:] / m
         rates = body.accelerations(w, along, torque, f[axes:before], m)
         return ca.substitute(rates, slope, body.velocity(q, w))
 
@@ -273,8 +273,8 @@ def point_function(
             if force is not None or torque is not None:
                 push = push + configuration.on(name, q, force, torque) / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
-    change = ca.gradient(lagrangian, q) + moved, ca.gradient(lagrangian, v) + inertia
-    return ca.Function("point", [t, q, v, m], [*change, push])
+    change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
+    return ca.Function("point", [t, q, v, m], [*change, configuration.shared(push, m)])
 
 
 def split_effects(

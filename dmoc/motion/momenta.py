@@ -209,7 +209,7 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
     nodes = ca.vertsplit(q, n)
     controls = [u[:size] if hold else u[size * j : size * (j + 1)] for j in range(rule.degree + 1)]
     push = [
-        dynamics.actuator.acts(body, place + origin, control) / m[j]
+        body.driven(dynamics.actuator, place + origin, control, m[j])
         for j, (place, control) in enumerate(zip(nodes, controls, strict=True))
     ]
 

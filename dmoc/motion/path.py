@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,6 +90,12 @@ class DiscretePath:
     def place(self) -> np.ndarray:
         """The coordinates that are places in space [m], shape (nodes, axes)."""
         return self.position[:, self.made_of.places] if self.made_of else self.position
+
+    def place_of(self, constraint: Any) -> np.ndarray:
+        """The place that a constraint limits [m], shape (nodes, axes): the centre of mass or a point."""
+        if constraint.point is None:
+            return self.place
+        return constraint.seen(self.position, np.zeros((len(self.position), self.coordinates.motions.size)))[0]
 
     def moved(self, bend: np.ndarray) -> DiscretePath:
         """The path with its places moved by a bend, shape (nodes, axes) [m]."""

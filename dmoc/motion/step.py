@@ -124,7 +124,7 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
 
     def push(positions: Sequence) -> list:
         at = [(positions[j] + origin, u[:, 0 if hold else j], m[j]) for j in range(s + 1)]
-        return [dynamics.actuator.acts(body, place, control) / mass for place, control, mass in at]
+        return [body.driven(dynamics.actuator, place, control, mass) for place, control, mass in at]
 
     rate = dynamics.velocity(t, q + origin, p, m[0])
     velocity = body.velocity(q + origin, rate)

@@ -78,7 +78,7 @@ class _Writer:
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
         resting, _ = split_effects(self.problem.effects, body)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
-        push = push if u is None else push + self.actuator.acts(body, q, u) / m
+        push = push if u is None else push + body.driven(self.actuator, q, u, m)
         if body.conditions:
             push = push - body.pull(q, draft.take("reaction", body.conditions))
         draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)))
@@ -112,7 +112,7 @@ class _Writer:
             u = [draft.control(frame, at) for frame, at in zip(frames, nodes, strict=True)]
         body = self.dynamics.configuration
         push = [
-            self.actuator.acts(body, place + self.origin, u[0]) / mass if self.hold else 0
+            body.driven(self.actuator, place + self.origin, u[0], mass) if self.hold else 0
             for place, mass in zip(r, m, strict=True)
         ]
         moving = self.dynamics.step_point(rule.degree, split_effects(problem.effects, body)[1])

@@ -54,6 +54,8 @@ class Actuator(ABC):
     # A throttle among the controls equals |F|, rounded at zero over this part of the largest thrust [-];
     # None for an actuator without such a throttle.
     smoothing: float | None = None
+    # What becomes of the inertia of a body that turns while it burns: "scaled" with the mass, or "constant".
+    inertia_law: str = "scaled"
     # Whether it is off for parts of a usual transfer: pictures then shade the times when it is on.
     coasts: ClassVar[bool] = False
     # Whether it acts on rigid bodies alone.
@@ -62,6 +64,8 @@ class Actuator(ABC):
     moves_body: ClassVar[bool] = True
     # The unit of what `Effort` gives with it.
     effort_unit: ClassVar[str] = "N^2 s"
+    # The unit of what `Fuel` gives with it where it burns nothing.
+    meter_unit: ClassVar[str] = "N s"
     # Pictures label the line at the force limit with this.
     limit_label: ClassVar[str] = "limit"
 

@@ -6,8 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import Vector, vector
+from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape
 from dmoc.parts.rows import Row
@@ -37,6 +40,9 @@ class Constraint(ABC):
     dimension, `u` the controls of the node or None where they are held, and fields named in `adjustable`,
     which may change from one solve to the next without a rebuild, may be symbols inside `rows`.
 
+    A constraint with a field `point` limits that point of a body that turns in place of the centre of mass:
+    `q` and `v` are then its position and velocity, in everything above.
+
     Examples
     --------
     >>> @dataclass(frozen=True)
@@ -56,6 +62,13 @@ class Constraint(ABC):
     turns_body: ClassVar[bool] = False
     # Whether it needs a body with a position.
     moves_body: ClassVar[bool] = True
+    # The point of the body that it limits, in body axes from the centre of mass [m]; None for the centre.
+    point: Any = None
+
+    @property
+    def structure(self) -> tuple:
+        """The type and all that is built into the rows: equal for constraints that one NLP can serve."""
+        return type(self), self.point is None
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the constraint has no meaning in this many dimensions."""
@@ -69,19 +82,41 @@ class Constraint(ABC):
         return []
 
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
-        """Rows that hold at every node, of a body as effects see it: those of its position by default."""
-        return self.rows(t, body.position, u, m)
+        """Rows that hold at every node, of a body as effects see it: of its position, or of a point of it."""
+        return self.rows(t, self._place_and_velocity(body)[0], u, m)
 
     def speed_rows_of(self, body: Body) -> list[Row]:
-        """Rows that hold at the Gauss points and at both ends: those of its velocity by default."""
-        return self.speed_rows(body.velocity)
+        """Rows that hold at the Gauss points and at both ends: of its velocity, or of that of a point of it."""
+        return self.speed_rows(self._place_and_velocity(body)[1])
+
+    def _place_and_velocity(self, body: Body) -> tuple[Any, Any]:
+        """Those of the centre of mass or of the point of the body that is limited."""
+        if self.point is None:
+            return body.position, body.velocity
+        point = self.point if isinstance(self.point, ca.SX) else ca.DM(self.point)
+        # Between the nodes the interpolated quaternion is shorter than 1: R and the rate are too small by its
+        # square.
+        size = ca.dot(body.attitude, body.attitude)
+        turned = body.rotation / size
+        return body.position + turned @ point, body.velocity + turned @ ca.cross(body.rate / size, point)
 
     def seen(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The part of coordinates and independent velocities, one row each, that `excess` takes.
 
-        Those of the position by default: the first three of a body that turns.
+        Those of the position by default, the first three of a body that turns, or those of its `point`.
         """
-        return q[:, :3], v[:, :3]
+        if self.point is None:
+            return q[:, :AXES], v[:, :AXES]
+        attitude, arm = q[:, -QUATERNION:], np.broadcast_to(self.point, (len(q), AXES))
+        swept = np.cross(v[:, -AXES:], arm)
+        return q[:, :AXES] + rotated(attitude, arm), v[:, :AXES] + rotated(attitude, swept)
+
+    @property
+    def of_point(self) -> str:
+        """What `words` end with: of which point of the body they speak."""
+        if self.point is None:
+            return ""
+        return f" with its point ({', '.join(f'{x:g}' for x in self.point)}) m"
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         """Plain bounds of the position [m]."""
@@ -151,3 +186,22 @@ class Constraint(ABC):
     def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         """Names of the ways past it, each with the bend of the path that leads there, zero at its ends [m]."""
         return iter(())
+
+
+def checked_point(part: Constraint, value: Vector | None) -> tuple[float, ...] | None:
+    """A point of a body in body axes from the centre of mass [m]; None for the centre itself.
+
+    Raises
+    ------
+    ValueError
+        If it is not three numbers.
+    """
+    if value is None:
+        return None
+    found = vector(f"{type(part).__name__}: point", value, "m")
+    if len(found) != AXES:
+        raise ValueError(
+            f"{type(part).__name__}: point must have three entries [m], in body axes from the centre of mass; "
+            f"got {len(found)}"
+        )
+    return found if any(found) else None

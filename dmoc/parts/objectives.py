@@ -130,13 +130,16 @@ class Effort(Objective):
 
 @dataclass(frozen=True)
 class Fuel(Objective):
-    """Least fuel: the propellant burnt [kg], or without an exhaust velocity the integral of |F| dt [N s]."""
+    """Least fuel: the propellant burnt [kg], or without an exhaust velocity the integral of |F| dt [N s].
+
+    Of a `BallTorque` alone it is the integral of |tau| dt [N m s].
+    """
 
     unit: ClassVar[str] = "kg"
     metered: ClassVar[bool] = True
 
     def unit_with(self, actuator: Actuator) -> str:
-        return "kg" if actuator.burns else "N s"
+        return "kg" if actuator.burns else actuator.meter_unit
 
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         return actuator.flow(u) if actuator.burns else actuator.throttle(u)

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import checked, number
+from dmoc.basics.arguments import Vector, checked, number
 from dmoc.basics.digits import up
-from dmoc.parts.constraint import Constraint
+from dmoc.parts.constraint import Constraint, checked_point
 from dmoc.parts.rows import Row
 
 
@@ -22,14 +22,22 @@ class SpeedLimit(Constraint):
     ----------
     limit : float
         Largest speed [m/s].
+    point : sequence of float, optional
+        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
+        not given.
     """
 
     limit: float
+    point: Vector | None = None
     unit: ClassVar[str] = "m/s"
-    adjustable: ClassVar[tuple[str, ...]] = ("limit",)
 
     def __post_init__(self) -> None:
-        checked(self, limit=number("limit", self.limit, "m/s", positive=True))
+        limit = number("limit", self.limit, "m/s", positive=True)
+        checked(self, limit=limit, point=checked_point(self, self.point))
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("limit",) if self.point is None else ("limit", "point")
 
     def speed_rows(self, v: Any) -> list[Row]:
         return [Row("speed", ca.dot(v, v) / self.limit**2, -np.inf, 1.0)]
@@ -38,7 +46,7 @@ class SpeedLimit(Constraint):
         return np.maximum(0.0, np.linalg.norm(v, axis=1) - self.limit)
 
     def words(self) -> str:
-        return f"is never faster than {self.limit:g} m/s"
+        return f"is never faster than {self.limit:g} m/s{self.of_point}"
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         return self.limit * (np.sqrt(1 + value) - 1), "m/s"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from dmoc.basics.arguments import Vector, checked, entries, matching_length, number, same_length, short, vector
 from dmoc.basics.digits import down
 from dmoc.effects.user_functions import as_column, tried
-from dmoc.parts.constraint import Constraint
+from dmoc.parts.constraint import Constraint, checked_point
 from dmoc.parts.detours import off_centre, ways_round
 from dmoc.parts.outline import Ball, Box, Cone, Shape
 from dmoc.parts.rows import Row
@@ -28,18 +28,26 @@ class KeepOut(Constraint):
         Centre [m].
     radius : float
         Radius [m].
+    point : sequence of float, optional
+        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
+        not given.
     """
 
     center: Vector
     radius: float
-    adjustable: ClassVar[tuple[str, ...]] = ("center", "radius")
+    point: Vector | None = None
 
     def __post_init__(self) -> None:
         checked(
             self,
             center=vector("center", self.center, "m"),
             radius=number("radius", self.radius, "m", positive=True),
+            point=checked_point(self, self.point),
         )
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("center", "radius") if self.point is None else ("center", "radius", "point")
 
     def check_dimension(self, dimension: int) -> None:
         matching_length(self, "center", len(self.center), dimension)
@@ -52,7 +60,7 @@ class KeepOut(Constraint):
         return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
 
     def words(self) -> str:
-        return f"stays {self.radius:g} m away from {_place(self.center)}"
+        return f"stays {self.radius:g} m away from {_place(self.center)}{self.of_point}"
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
@@ -87,10 +95,14 @@ class KeepIn(Constraint):
     ----------
     lower, upper : sequence of float
         Opposite corners [m]; entries may be -inf and inf.
+    point : sequence of float, optional
+        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
+        not given.
     """
 
     lower: Vector
     upper: Vector
+    point: Vector | None = None
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
@@ -105,6 +117,7 @@ class KeepIn(Constraint):
             corner = (float(given[i] if i in endless else x) for i, x in enumerate(finite))
             checked(self, **{name: tuple(corner)})
         same_length("KeepIn", lower=self.lower, upper=self.upper)
+        checked(self, point=checked_point(self, self.point))
         for low, high in zip(self.lower, self.upper, strict=True):
             if low >= high:
                 raise ValueError(
@@ -114,14 +127,36 @@ class KeepIn(Constraint):
     def check_dimension(self, dimension: int) -> None:
         matching_length(self, "lower", len(self.lower), dimension)
 
+    @property
+    def structure(self) -> tuple:
+        # The walls for the centre are bounds, which may change; those for a point are built into its rows.
+        return (type(self), *([] if self.point is None else [self.lower, self.upper]))
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return () if self.point is None else ("point",)
+
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        if self.point is not None:
+            return super().bounds(dimension)
         return np.array(self.lower), np.array(self.upper)
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        if self.point is None:
+            return []
+        walls = zip("xyz", ca.vertsplit(q), self.lower, self.upper, strict=True)
+        return [
+            Row(f"{side}_{axis}", place, low, high, "m")
+            for axis, place, lower, upper in walls
+            for side, low, high in (("lower", lower, np.inf), ("upper", -np.inf, upper))
+            if np.isfinite([low, high]).any()
+        ]
 
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, np.maximum(self.lower - q, q - self.upper)).max(axis=1)
 
     def words(self) -> str:
-        return f"stays between {_place(self.lower)} and {_place(self.upper)}"
+        return f"stays between {_place(self.lower)} and {_place(self.upper)}{self.of_point}"
 
     def outline(self) -> tuple[Shape, ...]:
         return (Box(np.array(self.lower), np.array(self.upper)),)
@@ -132,7 +167,7 @@ class ApproachCone(Constraint):
     """Stay inside a cone: axis . d >= cos(half_angle) |d| with d the position from the apex.
 
     In the plane these are two straight lines. In space |d| is rounded over `rounding` at the apex,
-    where it has no derivative; the apex itself is allowed.
+    where it has no derivative; the apex itself is allowed. That makes it wider by rounding / tan(half_angle).
 
     Parameters
     ----------
@@ -144,6 +179,9 @@ class ApproachCone(Constraint):
         Between the axis and the surface [rad], less than pi/2.
     rounding : float
         [m].
+    point : sequence of float, optional
+        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
+        not given.
     """
 
     # A vector, or a function of the time.
@@ -151,6 +189,7 @@ class ApproachCone(Constraint):
     axis: Any
     half_angle: float
     rounding: float = 1e-6
+    point: Vector | None = None
 
     def __post_init__(self) -> None:
         for name in ("apex", "axis"):
@@ -180,6 +219,7 @@ class ApproachCone(Constraint):
             self,
             half_angle=half_angle,
             rounding=number("rounding", self.rounding, "m", positive=True),
+            point=checked_point(self, self.point),
         )
 
     @property
@@ -189,11 +229,12 @@ class ApproachCone(Constraint):
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
-        return ("half_angle", "rounding") if self.moves else ("apex", "axis", "half_angle", "rounding")
+        fixed = () if self.moves else ("apex", "axis")
+        return (*fixed, "half_angle", "rounding", *(() if self.point is None else ("point",)))
 
     @property
     def structure(self) -> tuple:
-        return (type(self), self.apex, self.axis) if self.moves else (type(self),)
+        return (*super().structure, *((self.apex, self.axis) if self.moves else ()))
 
     def _at(self, t: Any) -> tuple[Any, Any]:
         """Apex and unit axis at a time, for CasADi."""
@@ -234,14 +275,17 @@ class ApproachCone(Constraint):
         aside = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
         # The distance from the surface is |d| sin(angle beyond it); behind the tip it is |d| itself.
         beyond = np.arctan2(aside, depth) - self.half_angle
-        return np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
+        outside = np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
+        # Rounded, the cone is wider by so much, which is no fault of the path.
+        wider = self.rounding / np.tan(self.half_angle) if q.shape[1] == 3 else 0.0
+        return np.maximum(0.0, outside - wider)
 
     def words(self) -> str:
         angle = np.degrees(self.half_angle)
         if self.moves:
-            return f"stays in a cone of half angle {angle:g} degrees that moves"
-        axis = _numbers(self.axis)
-        return f"stays in the cone of half angle {angle:g} degrees from {_place(self.apex)} along {axis}"
+            return f"stays in a cone of half angle {angle:g} degrees that moves{self.of_point}"
+        where = f"from {_place(self.apex)} along {_numbers(self.axis)}"
+        return f"stays in the cone of half angle {angle:g} degrees {where}{self.of_point}"
 
     def outline(self) -> tuple[Shape, ...]:
         # One that moves has no one place in a picture of the whole way.

@@ -200,7 +200,9 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     axes.plot(times / late, speed / size, color=PATH, label=name)
     # Rest is no way back, whatever the sign of its rounding error.
     back = np.nanmin(speed) < -1e-6 * np.nanmax(np.abs(speed))
-    for constraint in solution.problem.constraints if solution.problem else ():
+    limits = solution.problem.constraints if solution.problem else ()
+    # The speed is that of the centre of mass.
+    for constraint in [one for one in limits if not one.turns_body and one.point is None]:
         if (limit := constraint.largest_speed()) is not None:
             for side in (limit, -limit) if back else (limit,):
                 axes.axhline(side / size, label="limit", **LIMIT)

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.parts.outline import Ball, Box
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, readable, within_steps
 from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
-from dmoc.plots.turning import draw_triads
+from dmoc.plots.turning import draw_triads, paths_of_points
 from dmoc.results.solution import Solution
 
 # Step ends are drawn as dots if there are at most this many steps: more would hide the line.
@@ -48,6 +48,8 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
     _mark_ends(axes, path[:1].T, path[-1:].T)
     if solution.path.attitudes:
         draw_triads(axes, solution, size)
+    for label, swept in paths_of_points(solution).items():
+        axes.plot(*swept.T / size, color=DARK, linestyle="--", linewidth=1.5, label=label, zorder=3)
     if solution.dimension == 3:
         floor = np.full(len(path), view[0][2])
         # Beside the axes of a body there is no room for its entry in the legend.
@@ -81,7 +83,8 @@ def is_wide(solution: Solution) -> bool:
 
 def _view(solution: Solution) -> Corners:
     tails, arrows, _ = _arrows(solution)
-    return view_of(solution, np.concatenate([solution.position, tails + arrows]))
+    swept = paths_of_points(solution).values()
+    return view_of(solution, np.concatenate([solution.position, tails + arrows, *swept]))
 
 
 def burning(solution: Solution) -> np.ndarray | None:

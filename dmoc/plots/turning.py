@@ -100,6 +100,22 @@ def draw_triads(axes: Any, solution: Solution, size: float) -> None:
             axes.plot(*line.T, color=AXIS_COLOURS[i], linewidth=2.0, zorder=5, label=f"body {name}")
 
 
+def paths_of_points(solution: Solution) -> dict[str, np.ndarray]:
+    """The paths of points of the body that have limits of their own [m], by the label of each."""
+    limits = solution.problem.constraints if solution.problem else ()
+    points = {tuple(one.point) for one in limits if one.point is not None}
+    if not points:
+        return {}
+    place, attitude = (
+        within_steps(solution, part)[1] for part in (solution.position, solution.path.attitudes[0])
+    )
+    return {
+        f"path of point ({', '.join(f'{x:g}' for x in point)}) m": place
+        + rotated(normalised(attitude), np.broadcast_to(point, place.shape))
+        for point in sorted(points)
+    }
+
+
 def control_panels(solution: Solution) -> list[tuple[str, list[int]]]:
     """The channels of the actuator that share a panel: unit and places."""
     units = solution.provenance.control_units
@@ -125,6 +141,11 @@ def draw_controls(axes: Any, solution: Solution, late: float, panel: tuple[str, 
         for level in np.unique(sides[np.isfinite(sides)]):
             if abs(level) <= 4 * largest:
                 axes.axhline(level / size, label="limit", **LIMIT)
+        if unit == "N m" and not np.isfinite(sides).any() and (limit := actuator.torque_limit()) is not None:
+            # The limit is one of the magnitude.
+            total = np.linalg.norm(control, axis=1) / size
+            axes.plot(times / late, total, color=DARK, linestyle=(0, (1, 1)), label="magnitude")
+            axes.axhline(limit / size, label="limit", **LIMIT)
     name = "torque" if unit == "N m" else "force"
     axes.set_ylabel(f"{name} [{shown}]")
     axes.set_title(f"{name.capitalize()} of the actuator" + (", held over each step" if solution.hold else ""))

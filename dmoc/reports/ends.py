@@ -25,7 +25,8 @@ def body_words(problem: TransferProblem) -> str:
 
     moments = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(np.array(problem.inertia)))
     moved = f"{axes} and attitude" if problem.start.has_position else "attitude alone"
-    law = ", which shrink with the mass" if problem.actuator.burns else ""
+    shrinks = problem.actuator.burns and problem.actuator.inertia_law == "scaled"
+    law = ", which shrink with the mass" if shrinks else ""
     return f"{problem.mass:g} kg, {moved}, principal moments {moments} kg m^2{law}"
 
 

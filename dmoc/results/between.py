@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmoc.basics.quaternions import QUATERNION, normalised
+from dmoc.basics.quaternions import QUATERNION, conjugate, normalised
+from dmoc.basics.quaternions import times as product
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
@@ -74,32 +75,59 @@ def cuts(
     constraints : sequence of Constraint
     path : DiscretePath
     velocity : array, shape (nodes, coordinates)
-        dq/dt at every node, that of places in [m/s].
+        dq/dt at every node, that of places in [m/s]; that of a quaternion gives the rate.
     extent, speed : float
         The scales of the path [m], [m/s].
     start_time : float
         [s], for zones that move.
     """
-    if not constraints or not path.place.size:
+    if not path.place.size:
         return
-    velocity = velocity[:, path.coordinates.places]
-    longest = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).max())
-    inside, chord, moving, straight = _inside_gaps(constraints, path, velocity, longest)
+    ours = [(i, constraint) for i, constraint in enumerate(constraints) if not constraint.turns_body]
+    for point in dict.fromkeys(_key(constraint) for _, constraint in ours):
+        these = [(i, constraint) for i, constraint in ours if _key(constraint) == point]
+        yield from _cuts_of(these, path, *_motion(these[0][1], path, velocity), (extent, speed, start_time))
+
+
+def _key(constraint: Constraint) -> tuple | None:
+    return None if constraint.point is None else tuple(constraint.point)
+
+
+def _motion(constraint: Constraint, path: DiscretePath, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] and velocities [m/s] at the nodes of what a constraint limits: the centre or a point."""
+    velocity = slopes[:, path.coordinates.places]
+    if constraint.point is None:
+        return path.place, velocity
+    at = path.coordinates.quaternions[0]
+    rate = 2 * product(conjugate(path.position[:, at]), slopes[:, at])[:, 1:]
+    return constraint.seen(path.position, np.hstack([velocity, rate]))
+
+
+def _cuts_of(
+    ours: list[tuple[int, Constraint]],
+    path: DiscretePath,
+    place: np.ndarray,
+    velocity: np.ndarray,
+    scales: tuple[float, float, float],
+) -> Iterator[Cut]:
+    """`cuts` of constraints that limit the same point of the body, of which these are the motion at nodes."""
+    extent, speed, start_time = scales
+    longest = float(np.linalg.norm(np.diff(place, axis=0), axis=1).max())
+    smallest = min(constraint.feature() for _, constraint in ours)
+    inside, chord, moving, straight = _inside_gaps(smallest, path, place, velocity, longest)
     parts = (len(inside) - 1) // (len(path.position) - 1)
     fractions = np.interp(np.arange(len(inside)) / parts, np.arange(len(path.position)), path.fractions)
     times = start_time + path.duration * fractions
     bend = _most(np.linalg.norm(inside - chord, axis=1))
     sway = _most(np.linalg.norm(moving - straight, axis=1)) + 0.5 * _bump(path, velocity)
     still, none = np.zeros_like(inside), np.empty(0, int)
-    for i, constraint in enumerate(constraints):
-        if constraint.turns_body:
-            continue
+    for i, constraint in ours:
         name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
         if constraint.limits_speed:
             allowed = BOUND * speed + min(sway, DEEPEST * speed)
             yield Cut(name, i, _most(constraint.excess_at(times, inside, moving)), allowed, "m/s", none)
             continue
-        at_nodes = _most(constraint.excess_at(times[::parts], path.place, velocity))
+        at_nodes = _most(constraint.excess_at(times[::parts], place, velocity))
         yield Cut(f"{name} at nodes", i, at_nodes, BOUND * extent, unit, none)
         size = constraint.feature()
         # A zone that tells no size is judged by how deep the chords themselves cut into it.
@@ -167,16 +195,14 @@ def _steps(path: DiscretePath, broken: np.ndarray) -> np.ndarray:
 
 
 def _inside_gaps(
-    constraints: Sequence[Constraint], path: DiscretePath, v: np.ndarray, longest: float
+    smallest: float, path: DiscretePath, q: np.ndarray, v: np.ndarray, longest: float
 ) -> tuple[np.ndarray, ...]:
     """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.
 
-    The path is the cubic that has the positions and velocities of both nodes; it is looked at often
-    enough not to step over a zone that is smaller than the longest gap [m].
+    The path is the cubic that has the positions q and velocities v of both nodes; it is looked at often
+    enough not to step over a zone of the smallest size if that is smaller than the longest gap [m].
     """
-    q = path.place
     tau = path.duration * np.diff(path.fractions)[:, None, None]
-    smallest = min(constraint.feature() for constraint in constraints)
     parts = int(np.clip(4 * longest / smallest, FEWEST, max(FEWEST, MOST_PLACES // len(q))))
     u = (np.arange(parts) / parts)[:, None]
     # The cubic is the chord plus a bend that vanishes at both nodes, from the end velocities less the mean one.

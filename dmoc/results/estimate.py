@@ -94,7 +94,7 @@ def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:
     if width is None or density is None:
         return 0.0
     weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
-    force = np.linalg.norm(path.control[:, : problem.dimension], axis=1) / problem.actuator.force_limit()
+    force = np.linalg.norm(path.control[:, : problem.dimension], axis=1) / problem.actuator.main_limit()
     return float(abs(weights * density[:, 0] @ (width**2 / np.hypot(force, width))))
 
 

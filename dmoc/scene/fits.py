@@ -99,6 +99,11 @@ def check_acts_on(part: Any, turns: bool, moves: bool) -> None:
         If the body has not what the part needs.
     """
     name = type(part).__name__
+    if getattr(part, "point", None) is not None and not turns:
+        raise ValueError(
+            f"{name} is for a point beside the centre of mass, which only a body that turns has; leave point "
+            "out, or give the problem an inertia [kg m^2] and ends with an attitude, Pose"
+        )
     if part.turns_body and not turns:
         raise ValueError(
             f"{name} acts on a body that turns; give the problem an inertia [kg m^2] and ends with an "

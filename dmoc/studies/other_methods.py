@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import make_solver, status_of
@@ -49,10 +50,11 @@ class Formulation:
     objective_unit : float
         The objective in its own unit is this times f.
     ends : MX, shape (2 axes, 2)
-        Position [m] and velocity [m/s] at the start and at the goal.
+        Position [m] and velocity [m/s] at the start and at the goal; of a body that turns its coordinates and
+        its independent velocities, of shape (coordinates + velocities, 2).
     controls : MX, shape (axes, count)
-        Forces [N] at `points` of every step, step after step; where the points include both ends of a
-        step, neighbours share theirs.
+        Forces [N], or the controls of the actuator, at `points` of every step, step after step; where the
+        points include both ends of a step, neighbours share theirs.
     points : tuple of float
         Fractions of a step between 0 and 1, through which the force is a polynomial.
     """
@@ -117,7 +119,8 @@ def flown_path(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM
     The independent integrator reads such a path: its controls are polynomials over each step.
     """
     ends, forces = (part.full() for part in ca.Function("read", [made.x], [made.ends, made.controls])(x))
-    n, points = problem.dimension, np.array(made.points)
+    body, points = configuration_of(problem), np.array(made.points)
+    n = body.size
     # where a step's last point is the first one of the next step, the two share one column of `controls`
     shared = int(points[0] == 0 and points[-1] == 1)
     at = np.arange(len(points))[:, None] + (len(points) - shared) * np.arange(steps)
@@ -127,9 +130,8 @@ def flown_path(problem: TransferProblem, made: Formulation, steps: int, x: ca.DM
     position = np.linspace(ends[:n, 0], ends[:n, 1], steps + 1)
     mass = np.full(steps + 1, problem.mass)
     duration, velocities = problem.duration_bounds[0], (ends[n:, 0], ends[n:, 1])
-    return DiscretePath(
-        uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities
-    ), forces.shape[1]
+    parts = uniform_mesh(steps), 2, True, duration, position, control, mass, *velocities
+    return DiscretePath(*parts, made_of=body.coordinates), forces.shape[1]
 
 
 @dataclass(frozen=True)

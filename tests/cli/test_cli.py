@@ -243,6 +243,14 @@ def test_show_says_the_scene_its_parameters_and_the_size(run):
     assert "2412 unknowns" in out and "order 2, 400 steps" in out
 
 
+def test_show_gives_the_size_of_what_a_solve_without_options_solves(run):
+    """A body that turns has another default order, and many revolutions have one of their own."""
+    _, out, _ = run("show", "reorientation")
+    assert "1614 unknowns" in out and "order 4, 100 steps" in out
+    _, out, _ = run("show", "geo_raise")
+    assert "order 6, 400 steps" in out
+
+
 def test_words_of_effects_that_have_none():
     from dataclasses import dataclass
 

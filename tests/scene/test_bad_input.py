@@ -64,9 +64,10 @@ ELLIPSE = {"mu": 1.0, "a": 9.0, "e": 0.1, "i": 0.0, "node": 0.0, "argument": 0.0
 PLATES = Plates((1.0,), ((1, 0, 0),), ((0, 1, 0),))
 # arguments that are good, one of which is then replaced
 MAKES = {
-    "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6},
+    "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6, "point": None},
     "Attitude": {"quaternion": (1, 0, 0, 0), "rate": (0, 0, 0), "other_way": False},
     "BallForce": {"limit": 2.0},
+    "BallTorque": {"limit": 2.0},
     "BoxForce": {"limit": 2.0},
     "CircularOrbit": {"radius": 2.0, "mu": 1.0, "center": (0, 0), "normal": None, "clockwise": False},
     "ClohessyWiltshire": {"mean_motion": 0.1},
@@ -99,8 +100,8 @@ MAKES = {
     "FinalRadius": {"center": (0, 0)},
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
-    "KeepIn": {"lower": (-9, -9), "upper": (9, 9)},
-    "KeepOut": {"center": (2, 2), "radius": 0.5},
+    "KeepIn": {"lower": (-9, -9), "upper": (9, 9), "point": None},
+    "KeepOut": {"center": (2, 2), "radius": 0.5, "point": None},
     "LinearDrag": {"coefficient": 0.1, "wind": None},
     "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched", "attitude": None, "rate": "matched"},
     "Nozzles": {
@@ -121,7 +122,7 @@ MAKES = {
     "RadiationPressure": {"area": 1.0, "reflectivity": 0.5, "sun": (1.5e11, 0), "shadow": None},
     "RateLimit": {"limit": 9.0},
     "RotatingFrame": {"rate": 0.1},
-    "SpeedLimit": {"limit": 9.0},
+    "SpeedLimit": {"limit": 9.0, "point": None},
     "Spring": {"stiffness": 1.0, "anchor": (0, 0)},
     "State": {"position": (0, 0), "velocity": (0, 0)},
     "ThirdBody": {"mu": 1.0, "position": (9, 9)},
@@ -132,6 +133,7 @@ MAKES = {
         "both_ways": False,
         "exhaust_velocity": 100.0,
         "dry_mass": 0.1,
+        "inertia_law": "scaled",
     },
     "Torque": {"limit": 2.0},
     "TransferProblem": scene(

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from dmoc import FreeForce, PointGravity, State, TransferProblem, solve
+from dmoc import FreeForce, PointGravity, Pose, State, TransferProblem, Wrench, rotation, solve
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import work_precision
 from dmoc.studies.other_methods import load_methods
@@ -68,6 +68,36 @@ def test_plain_is_the_same_scheme(name):
     problem = load_problem(name).make()
     (plain,) = trials_of("plain", problem, [100], 1.0)
     assert plain.objective == pytest.approx(solve(problem, steps=100).objective, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["reorientation", "heavy_top", "spin_to_spin"])
+def test_plain_is_the_same_scheme_of_bodies_that_turn(name):
+    """Manchester and Peck's equations by hand, with potentials and spinning ends."""
+    problem = load_problem(name).make()
+    (plain,) = trials_of("plain", problem, [40], 1.0)
+    assert plain.objective == pytest.approx(solve(problem, order=2, steps=40).objective, rel=1e-8)
+
+
+OF_A_TURN = {2: (20, 40), 4: (10, 20), 5: (6, 12), 9: (3, 5)}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_turns_a_body_with_its_order(name):
+    """The optimum is that of indirect shooting on Euler's equations, as for dmoc's own orders."""
+    meshes = OF_A_TURN[ORDERS[name]]
+    found = trials_of(name, load_problem("reorientation").make(), meshes, 0.753733560549)
+    seen = np.log(found[0].error / found[1].error) / np.log(meshes[1] / meshes[0])
+    assert seen > ORDERS[name] - 0.5
+    assert found[1].path_error < 0.3 * found[0].path_error
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_moves_and_turns_a_body(name):
+    """By a force and a torque in body axes; the optimum is that of indirect shooting."""
+    goal = Pose((2, 1, -1), attitude=rotation((0.2, 0.5, -0.8), math.degrees(2)))
+    problem = TransferProblem(3.0, Pose((0, 0, 0)), goal, 5.0, actuator=Wrench(), inertia=(1, 2, 2.8))
+    (found,) = trials_of(name, problem, [20], 3.69659102851)
+    assert found.error < (2e-2 if ORDERS[name] == 2 else 1e-4)
 
 
 @pytest.mark.parametrize("name", METHODS)
