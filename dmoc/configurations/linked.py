@@ -108,11 +108,5 @@ class Linked(Configuration):
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
         return self.free.generalised(q, force, torque, spun)
 
-    def turning_share(self, m: Any) -> Any:
-        return self.free.turning_share(m)
-
-    def shared(self, column: Any, m: Any) -> Any:
-        return self.free.shared(column, m)
-
     def rotation(self, q: Any) -> Any:
         return self.free.rotation(q)
