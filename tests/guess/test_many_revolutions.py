@@ -10,7 +10,7 @@ import pytest
 from dmoc import KeepIn, PointGravity, State, TransferProblem, solve
 from dmoc.checks.verification import verify
 from dmoc.guess.starting import starting_guess
-from dmoc.guess.tube import in_tube
+from dmoc.solver.tube import in_tube
 from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import find, load_problem
