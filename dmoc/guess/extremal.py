@@ -12,6 +12,7 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.effects.base import Attractor
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 
@@ -61,16 +62,21 @@ class Extremal:
     @cached_property
     def length(self) -> float:
         """The unit of length, the distance from the attractor at the start [m]."""
-        attractor = self.problem.attraction.lone
-        assert attractor is not None
-        return float(np.linalg.norm(self.state[0] - attractor.place(self.problem.dimension)))
+        return float(np.linalg.norm(self.state[0] - self._attractor.place(self.problem.dimension)))
 
     @cached_property
     def speed(self) -> float:
         """The unit of speed, that of a circular orbit there [m/s]."""
-        attractor = self.problem.attraction.lone
-        assert attractor is not None
-        return float(np.sqrt(attractor.mu / self.length))
+        return float(np.sqrt(self._attractor.mu / self.length))
+
+    @cached_property
+    def _attractor(self) -> Attractor:
+        """The attractor around which motion is fastest at the start: the only one, or the next one."""
+        place, n = self.state[0], self.problem.dimension
+        return max(
+            self.problem.attraction.sources,
+            key=lambda one: one.mu / (np.linalg.norm(place - one.place(n)) ** 3 or np.inf),
+        )
 
     @property
     def thrust(self) -> float:

@@ -12,6 +12,7 @@ from dmoc.basics.arguments import LARGEST, short
 from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
+from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.open_ends import end_estimates, spiral_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -56,12 +57,10 @@ def starting_guess(
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = duration or guess_duration(problem)
-    if (
-        given is None
-        and not problem.links
-        and (best := _least_effort(problem, mesh, order, hold, duration)) is not None
-    ):
-        return best
+    if given is None and not problem.links:
+        for found in (_least_effort, _past_attractors):
+            if (best := found(problem, mesh, order, hold, duration)) is not None:
+                return best
     places = len(mesh) - 1 if hold else len(fractions)
     control, spiral = np.zeros((places, problem.controls)), False
     if given is None and problem.links:
@@ -122,14 +121,46 @@ def _least_effort(
     path = least_effort(problem, duration, start)
     if path is None:
         return None
-    rule = scheme(order)
-    position, velocity, force, mass = path(node_fractions(mesh, rule))
+    position, velocity, force, mass = path(node_fractions(mesh, scheme(order)))
     position[0] = start[0]
-    if hold:
-        force = np.einsum("j,jkn->kn", rule.weights, force[step_nodes(len(mesh) - 1, rule)])
-    thrust = np.linalg.norm(force, axis=1, keepdims=True)
-    control = np.hstack([force, thrust]) if more else force
+    control = _controls_of(problem, force, mesh, order, hold)
     return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])
+
+
+def _past_attractors(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
+) -> DiscretePath | None:
+    """The path of least effort between two known states past several attractors, in a known duration.
+
+    Coasts that are blended may pass an attractor on the wrong side, where hundreds of times the effort are
+    needed.
+    """
+    attraction, ends = problem.attraction, (problem.start, problem.goal)
+    times = problem.start_time, problem.start_time + duration
+    states = tuple(end.estimate(at) for end, at in zip(ends, times, strict=True))
+    several = bool(attraction.sources) and attraction.lone is None and problem.dimension > 1
+    if not several or problem.free_duration or np.isnan(states).any():
+        return None
+    path = least_effort_past(problem, duration, states)
+    if path is None:
+        return None
+    position, _, force = path(node_fractions(mesh, scheme(order)))
+    position[[0, -1]] = states[0][0], states[1][0]
+    control = _controls_of(problem, force, mesh, order, hold)
+    if control is None:
+        control = np.zeros((len(mesh) - 1 if hold else len(position), problem.controls))
+    mass = np.full(len(position), problem.mass)
+    return DiscretePath(mesh, order, hold, duration, position, control, mass, states[0][1], states[1][1])
+
+
+def _controls_of(
+    problem: TransferProblem, force: np.ndarray, mesh: np.ndarray, order: int, hold: bool
+) -> np.ndarray | None:
+    """The controls that give forces at the nodes of a mesh [N]; held ones their mean in each step."""
+    if hold:
+        rule = scheme(order)
+        force = np.einsum("j,jkn->kn", rule.weights, force[step_nodes(len(mesh) - 1, rule)])
+    return controls_for(problem, force)
 
 
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:

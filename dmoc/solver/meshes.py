@@ -24,6 +24,10 @@ DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
 # by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
 # goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
 A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
+# A fall past one of several attractors gets this many steps a radian at each order, and no more than that in all:
+# on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5 iterations.
+A_RADIAN = {2: 40, 4: 10, 6: 5, 8: 2.5}
+MOST_PAST = {2: 1600, 4: 800, 6: 400, 8: 300}
 # A transfer of many revolutions has this order if none is asked for.
 ORDER_OF_MANY_TURNS = 6
 # A body that turns has this order if none is asked for: at the same cost its attitude is a thousand times as
@@ -34,6 +38,9 @@ ORDER_OF_TURNING = 4
 MOST_TURNS_OF_ORDER_6, ORDER_OF_MORE_TURNS = 30, 8
 # A transfer on which equal steps would be too long near an attractor has this order if none is asked for.
 ORDER_OF_UNEVEN = 4
+# Where such a one falls so close past one of several attractors that order 4 needs more steps than the default,
+# it has this order.
+ORDER_OF_DEEP_FALLS = 8
 
 # The coarsest mesh has this many nodes, with limits (True) and without (False); up to twice as many are solved
 # at once. Limits take many iterations, which are cheap on 100 nodes; without limits 400 nodes at once take no
@@ -66,6 +73,9 @@ TRIAL_STEPS = 20
 UNEVEN = 5.0
 # The angle around attractors is summed up over this many steps of a guess before its mesh is graded.
 SAMPLES = 1000
+# It is summed up anew over steps of equal angles, at most so many times in all, until none of them turns by more
+# than this many times their mean [-]: between two of the equal times a body may fall past an attractor and leave.
+GRADED, EVEN = 4, 10.0
 # A guess for a mesh of more than twice this many nodes is made on this many nodes and interpolated.
 GUESSED = 2000
 # A guess is interpolated only if it has at least this many nodes a revolution.
@@ -96,8 +106,12 @@ def first_path(
         steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
         first = starting_guess(problem, check_mesh(steps), order, hold, guess)
     if is_uneven(problem, first):
-        order = order or (2 if hold else ORDER_OF_UNEVEN)
-        return graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
+        if order is None:
+            order = 2 if hold else ORDER_OF_UNEVEN
+            if not hold and steps_past(problem, first, order) > DEFAULT_STEPS[order]:
+                order = ORDER_OF_DEEP_FALLS
+        enough = max(DEFAULT_STEPS[order], steps_past(problem, first, order))
+        return graded_guess(problem, steps or enough, order, hold, guess)
     return first
 
 
@@ -111,7 +125,7 @@ def trial_path(
         return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
 
     first = on(steps or TRIAL_STEPS)
-    enough = max(2 * least_steps(problem, first), steps_to_turn(first))
+    enough = max(2 * least_steps(problem, first), steps_to_turn(first), steps_past(problem, first, order))
     return on(enough) if steps is None and enough > TRIAL_STEPS else first
 
 
@@ -133,14 +147,27 @@ def is_uneven(problem: TransferProblem, path: DiscretePath) -> bool:
     return bool(rates.max() > UNEVEN * rates.min())
 
 
+def steps_past(problem: TransferProblem, path: DiscretePath, order: int) -> int:
+    """Steps of equal angles that follow a body which falls past one of several attractors; 0 elsewhere."""
+    if problem.attraction.lone is not None or not is_uneven(problem, path):
+        return 0
+    return int(min(A_RADIAN[order] * angle_around(problem, path), MOST_PAST[order]))
+
+
 def graded_guess(
     problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
-    fine = starting_guess(problem, uniform_mesh(SAMPLES), 2, hold, given)
-    rates = problem.attraction.rates(fine.place)
-    angles = np.append(0.0, np.cumsum((rates[1:] + rates[:-1]) / SAMPLES))
-    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
+    mesh = uniform_mesh(SAMPLES)
+    for _ in range(GRADED):
+        fine = starting_guess(problem, mesh, 2, hold, given)
+        rates = problem.attraction.rates(fine.place)
+        turned = 0.5 * (rates[1:] + rates[:-1]) * np.diff(mesh)
+        angles = np.append(0.0, np.cumsum(turned))
+        mesh = np.interp(uniform_mesh(SAMPLES), angles / angles[-1], mesh)
+        if turned.max() < EVEN * turned.mean():
+            break
+    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), uniform_mesh(SAMPLES), mesh)
     return starting_guess(problem, mesh, order, hold, given)
 
 
@@ -161,7 +188,8 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
         a_turn = order // 2 * COARSE_TURN[order] if order > 2 and turns > VERY_MANY_TURNS else 0
         in_phase = IN_PHASE * turns**1.5 if order == 2 else a_turn * turns
         turned = order // 2 * int(steps_to_turn(first) * TURN_A_STEP[first.order] / TURN_A_STEP[order])
-        least = max(least, order // 2 * least_steps(problem, first), int(in_phase), turned)
+        past = order // 2 * steps_past(problem, first, order)
+        least = max(least, order // 2 * least_steps(problem, first), int(in_phase), turned, past)
     while counts[-1] > 2 * least:
         counts.append(max(least, -(-counts[-1] // FINER[limited])) if order == first.order else least)
     places = np.linspace(0.0, 1.0, len(final))
@@ -171,16 +199,21 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
 
 def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
     """Steps that keep h omega below 1 along a path, omega the fastest rate of the linearised motion."""
-    sample = path.onto(uniform_mesh(min(100, len(path.mesh) - 1)), 2, path.hold)
+    count = min(100, len(path.mesh) - 1)
+    places = np.linspace(0.0, 1.0, len(path.mesh))
+    sample = path.onto(np.interp(uniform_mesh(count), places, path.mesh), 2, path.hold)
     slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
     dynamics = Dynamics.of(problem)
     flow, _ = flow_matrices(
         dynamics, sample, problem.start_time, rates_along(dynamics, sample.position, slopes)
     )
-    rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full(1, np.inf)
+    rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
     # A mode that dies out need not be followed.
-    fastest = max(rates.real.max(), np.abs(rates.imag).max())
-    return int(np.clip(path.duration * fastest, 2, MOST_COARSE))
+    fastest = np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
+    # On a graded mesh steps are short where the motion is fast.
+    h = count * np.diff(sample.mesh)
+    swept = (np.maximum(np.append(h, 0.0), np.append(0.0, h)) * fastest).max()
+    return int(np.clip(path.duration * swept, 2, MOST_COARSE))
 
 
 def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:

@@ -23,10 +23,17 @@ WORTH_TELLING = 1e-5
 # An answer that was held near its guess is an optimum if it is off one by less than this [-], half of what the
 # check called optimality allows.
 OFF_OPTIMUM = 5e-6
-# Answers are held as strongly as this [-], one after the other: the last one is an optimum wherever it lies.
-HELD = (1e-2, 1e-3, 1e-4, 3e-6)
+# Where many paths cost the same an answer is held near its guess as strongly as this or, where that leads
+# nowhere, as the next [-].
+HELD = (1e-2, 1e-3)
 # An attempt that is held ends after this many iterations: of four transfers between circles all got there.
 MOST_HOLDING = 200
+# An answer is let go by holding the next one near it, this many times as strongly [-]; where that leads nowhere
+# the root of this is tried, and the root of that.
+LESS, LEAST_LESS = 0.3, 0.7
+# Each of these attempts ends after this many iterations, those that get there take 5 to 40, and there are no more
+# than so many.
+MOST_LETTING_GO, MOST_LET_GO = 60, 20
 
 
 @dataclass(frozen=True)
@@ -90,19 +97,41 @@ class Rung:
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:
-    """An optimum by way of answers that are held near the one before, ever less, or None.
+    """An optimum by way of an answer that is held near a path and then let go, or None.
 
-    Where many paths cost the same Ipopt wanders among them. Each of these attempts, made by `try_on` from a
-    path with a strength to hold it, begins without multipliers: with them the barrier is so low that a switch
+    Where many paths cost the same Ipopt wanders among them. The attempts are made by `try_on` from a path with
+    a strength to hold it. The first begins without multipliers: with them the barrier is so low that a switch
     moves from node to node.
     """
-    rung = None
     for lean in HELD if has_linear_controls(problem) else ():
         rung = try_on(replace(start, multipliers={}), most=MOST_HOLDING, lean=lean)
         if rung.stopped:
             return rung
-        start = rung.path if rung.solved else start
-    return rung if rung is not None and rung.solved and rung.pull <= OFF_OPTIMUM else None
+        if rung.solved:
+            return let_go(try_on, rung, lean)
+    return None
+
+
+def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
+    """An optimum from an answer that was held so strongly; None if there is no way to it in a few attempts.
+
+    Each answer is held near the one before, ever less, and begins with its multipliers: a switch then moves by
+    little, and an attempt takes few iterations. Held at a tenth, begun anew, each took a hundred or wandered.
+    """
+    share = LESS
+    for _ in range(MOST_LET_GO):
+        if rung.pull <= OFF_OPTIMUM:
+            return rung
+        tried = try_on(rung.path, most=MOST_LETTING_GO, pinned=rung.pinned, lean=share * lean)
+        if tried.stopped:
+            return tried
+        if tried.solved:
+            rung, lean = tried, share * lean
+        elif share > LEAST_LESS:
+            return None
+        else:
+            share = share**0.5
+    return None
 
 
 def answered(asked: TransferProblem, used: TransferProblem) -> TransferProblem:

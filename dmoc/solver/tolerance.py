@@ -19,7 +19,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import MOST_HOLDING, OFF_OPTIMUM, Rung
+from dmoc.solver.rung import OFF_OPTIMUM, Rung, let_go
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
@@ -196,16 +196,12 @@ class _Refinement:
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        begun, lean = rung, self.lean
-        while rung.solved and rung.pull > OFF_OPTIMUM:
-            lean *= 0.1
-            # With multipliers the barrier is so low that a switch moves from node to node.
-            start = replace(rung.path, multipliers={})
-            rung = self.ladder.try_on(start, most=MOST_HOLDING, pinned=begun.pinned, lean=lean)
+        begun, found = rung, let_go(self.ladder.try_on, rung, self.lean)
         cost, sense = begun.level.objective, self.problem.objective.sense
         # Another optimum that costs a hundredth more is no better answer.
-        if not rung.solved or sense * (rung.level.objective - cost) > 0.01 * abs(cost):
+        if found is None or found.stopped or sense * (found.level.objective - cost) > 0.01 * abs(cost):
             return begun
+        rung = found
         none = np.ones(len(rung.nlp.mesh) - 1, int)
         moved = change((begun.path, begun.level.objective), (rung.path, rung.level.objective), none)
         if moved[1] > SAME_COST * self.tol:
