@@ -13,7 +13,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.stability import TURN_A_STEP, flow_matrices, steps_to_turn
+from dmoc.motion.stability import TURN_A_STEP, flow_matrices, stable_from, steps_to_turn
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
 
@@ -90,15 +90,27 @@ def first_path(
     if steps is None and (enough := steps_to_turn(first)) > len(first.mesh) - 1:
         return starting_guess(problem, check_mesh(enough), first.order, hold, guess)
     turns = angle_around(problem, first) / (2 * np.pi)
+    errors_add_up = turns
+    if steps is None and (fastest := _unstable_angle(problem, first)):
+        turns, errors_add_up = fastest / (2 * np.pi), 1.0
     if steps is None and turns > MANY_TURNS:
         many = ORDER_OF_MANY_TURNS if turns < MOST_TURNS_OF_ORDER_6 else ORDER_OF_MORE_TURNS
         order = order or (2 if hold else many)
-        steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
+        steps = max(
+            DEFAULT_STEPS[order], int(turns * A_TURN[order] * (errors_add_up**0.5 if order == 2 else 1))
+        )
         first = starting_guess(problem, check_mesh(steps), order, hold, guess)
     if is_uneven(problem, first):
         order = order or (2 if hold else ORDER_OF_UNEVEN)
         return graded_guess(problem, steps or DEFAULT_STEPS[order], order, hold, guess)
     return first
+
+
+def _unstable_angle(problem: TransferProblem, guess: DiscretePath) -> float:
+    """The angle [rad] of a linear motion on which the steps of a guess are unstable; else 0."""
+    dynamics, longest = Dynamics.of(problem), problem.duration_bounds[1]
+    stable, angle = stable_from(dynamics, guess, problem.start_time, longest)
+    return angle if stable > len(guess.mesh) - 1 else 0.0
 
 
 def trial_path(
@@ -111,7 +123,8 @@ def trial_path(
         return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
 
     first = on(steps or TRIAL_STEPS)
-    enough = max(2 * least_steps(problem, first), steps_to_turn(first))
+    stable, _ = stable_from(Dynamics.of(problem), first, problem.start_time, problem.duration_bounds[1])
+    enough = max(2 * least_steps(problem, first), 2 * stable, steps_to_turn(first))
     return on(enough) if steps is None and enough > TRIAL_STEPS else first
 
 
