@@ -71,6 +71,7 @@ class Reference:
 LANDING = "closed form (Meditch 1964)"
 MARS = "Bryson & Ho 1975: {}; indirect shooting"
 COPS = "COPS 3.0: 1.01283; collocation in three phases"
+ANGLES = "indirect shooting on the angles"
 EULER = "indirect shooting on Euler's equations"
 SHOOTING = "40 segments of constant thrust (3)"
 NO_AIR = {"oblate": False, "air": False}
@@ -93,6 +94,8 @@ TABLE = (
     Reference("reorientation", "effort", 0.753733560549, EULER, (8, 32), 1e-9),
     Reference("spin_to_spin", "effort", 0.290469349785, EULER, (8, 32), 1e-9),
     Reference("heavy_top", "effort", 1.273065578142, EULER, (8, 32), 1e-9),
+    Reference("pendulum", "effort", 1.212590595721, ANGLES, (8, 32), 1e-9),
+    Reference("arm_reach", "effort", 2.42391982977, ANGLES, (8, 64), 1e-9),
     Reference(
         "fast_turn", "least time", 3.243083277, "Bilimoria & Wie 1993: 3.243; switching times", (4, 100), 1e-4
     ),

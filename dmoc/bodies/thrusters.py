@@ -12,7 +12,7 @@ import numpy as np
 from dmoc.basics.arguments import Vector, checked, entries, flag, number, short, times_each, vector
 from dmoc.basics.quaternions import AXES
 from dmoc.bodies.torques import OnBody
-from dmoc.parts.actuator import Actuator
+from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.engines import Burner
 
 
@@ -146,6 +146,11 @@ class Thrusters(OnBody, Burner):
         return (
             self if self.max_thrust is None else replace(self, max_thrust=times_each(self.max_thrust, factor))
         )
+
+    def needs(self, eased: Actuator) -> str:
+        given = self.max_thrust or 0.0
+        factor = (eased.force_limit() or 0.0) / (self.force_limit() or 1.0)
+        return limit_told(self.limit_words, given, factor, "N")
 
     def words(self) -> str:
         most = "without a limit" if self.max_thrust is None else f"of at most {self.force_limit():g} N"

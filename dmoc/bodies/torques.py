@@ -9,9 +9,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, limits, number, short, times_each
-from dmoc.basics.digits import up
 from dmoc.basics.quaternions import AXES
-from dmoc.parts.actuator import Actuator
+from dmoc.parts.actuator import Actuator, limit_told
 
 
 class OnBody(Actuator):
@@ -29,6 +28,7 @@ class PureTorque(OnBody):
 
     effort_unit: ClassVar[str] = "N^2 m^2 s"
     meter_unit: ClassVar[str] = "N m s"
+    limit: float | Vector | None
 
     def size(self, dimension: int) -> int:
         return AXES
@@ -54,8 +54,9 @@ class PureTorque(OnBody):
         return "N m"
 
     def needs(self, eased: Actuator) -> str:
-        enough = up(eased.torque_limit() or 0.0)
-        return f"a torque limit of {enough} N m (you gave {self.torque_limit():g} N m)"
+        given = 0.0 if self.limit is None else self.limit
+        factor = (eased.torque_limit() or 0.0) / (self.torque_limit() or 1.0)
+        return limit_told("torque limit", given, factor, "N m")
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         return value * (self.torque_limit() or 1.0), "N m"
@@ -195,16 +196,10 @@ class Wrench(OnBody):
         return "force and torque limit"
 
     def needs(self, eased: Actuator) -> str:
-        pairs = (
-            (self.force_limit(), eased.force_limit(), "force", "N"),
-            (self.torque_limit(), eased.torque_limit(), "torque", "N m"),
-        )
-        words = [
-            f"a {name} limit of {up(enough or 0.0)} {unit} (you gave {given:g} {unit})"
-            for given, enough, name, unit in pairs
-            if given is not None
-        ]
-        return " and ".join(words)
+        factor = (eased.main_limit() or 0.0) / (self.main_limit() or 1.0)
+        pairs = ((self.most_force, "force limit", "N"), (self.most_torque, "torque limit", "N m"))
+        told = (limit_told(name, given, factor, unit) for given, name, unit in pairs if given is not None)
+        return " and ".join(told)
 
     def unlimited(self) -> Actuator:
         return Wrench(frame=self.frame, lever=self.lever)

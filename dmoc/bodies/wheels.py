@@ -20,11 +20,10 @@ from dmoc.basics.arguments import (
     times_each,
     vector,
 )
-from dmoc.basics.digits import up
 from dmoc.basics.quaternions import AXES
 from dmoc.bodies.torques import OnBody
 from dmoc.effects.base import Body
-from dmoc.parts.actuator import Actuator
+from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.rows import Row
 
@@ -167,8 +166,8 @@ class Wheels(OnBody):
         return "N m"
 
     def needs(self, eased: Actuator) -> str:
-        enough = up(eased.torque_limit() or 0.0)
-        return f"a motor torque of {enough} N m (you gave {self.torque_limit():g} N m)"
+        factor = (eased.torque_limit() or 0.0) / self.torque_limit()
+        return limit_told("motor torque", self.max_torque, factor, "N m")
 
     def share(self, u: np.ndarray) -> float:
         return float((np.abs(u) / np.asarray(self.max_torque)).max(initial=0.0))
@@ -239,9 +238,13 @@ class MomentumLimit(Constraint):
     def eased(self, slack: float) -> MomentumLimit:
         return self.times(1 + slack)
 
+    def within(self, problem: Any, entry: int) -> Any:
+        # It belongs to the wheels, which would state their own again.
+        return replace(problem, actuator=replace(problem.actuator, max_momentum=self.limit))
+
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
-        enough = up(eased.largest_speed() or 0.0)
-        return f"a max_momentum of {enough} N m s (you gave {self.largest_speed():g} N m s)"
+        factor = (eased.largest_speed() or 0.0) / self.largest_speed()
+        return limit_told("max_momentum", self.limit, factor, "N m s")
 
 
 def _unit(index: int, value: Any) -> tuple[float, ...]:

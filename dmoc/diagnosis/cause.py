@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmoc.diagnosis.elastic import MET, MOST_ITERATIONS, Relaxation
-from dmoc.diagnosis.relaxable import LEAST, Giving, Relaxable
+from dmoc.diagnosis.giving import LOOSER, Giving, Remedy
+from dmoc.diagnosis.relaxable import LEAST, Relaxable
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.transcription import transcribe_onto
@@ -25,6 +26,9 @@ HOPELESS = 0.05
 # A mesh is to blame if less than this part of the excess is sure to be left on ever shorter steps [-]: of one
 # that is due to the mesh nothing is left or, where burns are shorter than steps, up to 0.45; of a true one 0.9.
 SURE = 0.5
+# A path that leaps a zone between two nodes needs at least this many times the excess on steps of half the
+# length [-]: it has half the time, which takes twice the speed. Any other path needs about as much or less.
+LEAPT = 1.2
 # The mesh is asked for its share on guesses of up to this many nodes: finer ones are hardly to blame.
 MOST_CONFIRMED = 500
 # At most this many zones are relaxed, each alone, to find the one that is in the way.
@@ -43,8 +47,9 @@ class Cause:
     ----------
     path : DiscretePath or None
         A path that meets every row, if there is one after all.
-    needs : tuple of str
-        Changes that would be enough, each by itself: "a force limit of 0.26 N (you gave 0.2 N)".
+    needs : tuple of tuples of Remedy
+        Changes that would be enough, each by itself: "a force limit of 0.26 N (you gave 0.2 N)"; each followed
+        by larger ones, should it not be enough.
     rows : tuple of str
         Rows that cannot be met together; empty where a limit explains it.
     excess : float
@@ -57,7 +62,7 @@ class Cause:
     """
 
     path: DiscretePath | None = None
-    needs: tuple[str, ...] = ()
+    needs: tuple[tuple[Remedy, ...], ...] = ()
     rows: tuple[str, ...] = ()
     excess: float = np.inf
     zones: bool = False
@@ -68,13 +73,18 @@ class Cause:
         """Whether no finer mesh can help."""
         return HOPELESS < self.excess < np.inf and not self.coarse
 
+    def proven(self, holds: Callable[[TransferProblem], bool]) -> Cause:
+        """The same with those changes alone that are enough, as `holds` finds, each as small as that may be."""
+        found = (next((one for one in need if holds(one.problem)), None) for need in self.needs)
+        return replace(self, needs=tuple((one,) for one in found if one is not None))
+
     def words(self, local: bool = False) -> str:
         """One line for a person; empty if nothing was found. `local` if other guesses may well need less."""
         parts = []
         if self.needs:
             where = "with steps as long as these " if self.coarse else ""
             what = "a path near the guess" if local else "the transfer"
-            parts.append(f"{where}{what} needs {', or '.join(self.needs)}")
+            parts.append(f"{where}{what} needs {', or '.join(need[0].words for need in self.needs)}")
         if self.rows:
             parts.append(f"these rows cannot be met together: {', '.join(self.rows)}")
         return "; ".join(parts)
@@ -86,13 +96,20 @@ def confirmed_cause(
     """As `cause_of`; where more than the limits is needed, a mesh of twice the steps tells if that is to blame.
 
     A ramp or a burn that is shorter than a step takes a larger force there. The excess falls with the length of
-    the steps at least, so that on ever shorter ones at least 2 e2 - e1 is left of excesses e1 and e2.
+    the steps at least, so that on ever shorter ones at least 2 e2 - e1 is left of excesses e1 and e2. Where
+    shorter steps need more, the path leaps a zone between two nodes, and the zone is to blame.
     """
     cause = cause_of(problem, guess, tell, interrupt)
-    if not 0 < cause.excess <= FAR_OFF or len(guess.position) > MOST_CONFIRMED:
+    zones = any(np.isfinite(part.feature()) for part in problem.constraints) and not cause.zones
+    most = np.inf if zones else FAR_OFF
+    if not 0 < cause.excess <= most or np.isinf(cause.excess) or len(guess.position) > MOST_CONFIRMED:
         return cause
     finer = np.sort(np.append(guess.mesh, 0.5 * (guess.mesh[1:] + guess.mesh[:-1])))
     again = cause_of(problem, guess.onto(finer, guess.order, guess.hold), tell, interrupt, brief=True)
+    if zones and again.zones:
+        return again
+    if zones and LEAPT * cause.excess < again.excess < np.inf:
+        return _zones(Relaxable(problem, guess, tell, interrupt)) or cause
     left = 2 * again.excess - cause.excess
     return replace(cause, coarse=again.path is not None or left < SURE * cause.excess)
 
@@ -124,14 +141,21 @@ def cause_of(
     if found.slack[0] <= MET:
         return Cause(path=found.path)
     if brief:
-        return Cause(excess=float(found.slack[0]))
+        return Cause(excess=float(found.slack[0]) if found.exact else np.inf)
     needs = []
     for limit in limits:
         alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, found.path)
-        if alone.feasible and (words := limit.told(alone.slack[0])):
-            needs.append(words if alone.exact else f"{words}, which is more than enough")
-    needs += transfer.durations(joint, found, transfer.problem.duration_bounds[0])
-    return Cause(needs=tuple(needs), excess=float(found.slack[0])) if needs else _rows(transfer)
+        more = "" if alone.exact else ", which is more than enough"
+        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0], more)):
+            needs.append(enough)
+    # Limits of which none is enough alone may be so together.
+    every = transfer.remedies(limits, found.slack[0]) if found.exact and not needs else ()
+    needs += transfer.durations(joint, found, transfer.problem.duration_bounds[1])
+    if not needs:
+        rows = _rows(transfer)
+        # That nothing is enough alone may be due to the guess: a finer mesh is then worth its time.
+        return rows if rows.path is not None or not every else replace(rows, needs=(every,), rows=())
+    return Cause(needs=(*([every] if every else []), *needs), excess=float(found.slack[0]))
 
 
 def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
@@ -145,10 +169,11 @@ def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
     if force == speed == 1.0:
         return None
     problem, longest = transfer.problem, transfer.problem.duration_bounds[1]
-    wider = tuple(part.times(speed) if part.limits_speed else part for part in problem.constraints)
-    raised = replace(problem, actuator=problem.actuator.times(force), constraints=wider)
+    raised = replace(problem, actuator=problem.actuator.times(force))
+    for entry, part in enumerate(problem.constraints):
+        raised = part.times(speed).within(raised, entry) if part.limits_speed else raised
     higher = Relaxable(raised, transfer.guess, transfer.tell, transfer.interrupt, given=problem)
-    pairs = ((higher.force(), force), (higher.speed(), speed))
+    pairs = ((higher.force(), force), *((limit, speed) for limit in higher.speeds()))
     limits = [limit for limit, ratio in pairs if limit and ratio > 1]
     found = higher.relaxed(*limits, least=LEAST)(raised, higher.guess)
     if not found.feasible:
@@ -159,13 +184,15 @@ def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
     excess = max(limit.factor(found.slack[0]) for limit in limits)
     if brief:
         return Cause(excess=excess)
-    needs = [" and ".join(limit.told(found.slack[0]) for limit in limits)]
+    needs = [higher.remedies(limits, found.slack[0])]
     longer = longest * max(limit.factor(found.slack[0]) ** (1 / limit.falls) for limit in limits)
-    later = Relaxable(replace(problem, duration=longer), transfer.guess, transfer.tell, transfer.interrupt)
+    later = Relaxable(
+        replace(problem, duration=longer), transfer.guess, transfer.tell, transfer.interrupt, given=problem
+    )
     joint = later.relaxed(*later.limits(), least=LEAST)
     near = joint(later.problem, later.guess)
     needs += later.durations(joint, near, longest) if near.feasible else []
-    return Cause(needs=tuple(needs), excess=excess)
+    return Cause(needs=tuple(filter(None, needs)), excess=excess)
 
 
 def _one_alone(transfer: Relaxable, limits: list[Giving]) -> Cause | None:
@@ -174,8 +201,8 @@ def _one_alone(transfer: Relaxable, limits: list[Giving]) -> Cause | None:
         return None
     for limit in limits:
         alone = transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        if alone.feasible and (words := limit.told(alone.slack[0])):
-            return Cause(needs=(words,), excess=float(alone.slack[0]))
+        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0])):
+            return Cause(needs=(enough,), excess=float(alone.slack[0]))
     return None
 
 
@@ -196,9 +223,13 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
     factor = given.share(path.control)
     if factor <= 1:
         return Cause(path=path)
-    needs = (f"no more than {given.needs(given.times(factor))}",)
+    enough = (given.times(factor * (1 + looser)) for looser in LOOSER)
+    needs = tuple(
+        Remedy(f"no more than {given.needs(limit)}", replace(transfer.given, actuator=limit))
+        for limit in enough
+    )
     # Least effort may take a little more than the least that is needed, so only a large factor is an excess.
-    return Cause(needs=needs, excess=factor if factor > FAR_OFF else np.inf)
+    return Cause(needs=(needs,), excess=factor if factor > FAR_OFF else np.inf)
 
 
 def _rows(transfer: Relaxable) -> Cause:
@@ -222,10 +253,13 @@ def _rows(transfer: Relaxable) -> Cause:
 def _zones(transfer: Relaxable) -> Cause | None:
     """Each zone relaxed alone: how much each would have to give way by itself."""
     needs, excess = [], 0.0
-    for limit in transfer.zones()[:MOST_ZONES]:
+    for entry in transfer.zones()[:MOST_ZONES]:
+        if (limit := transfer.zone(entry)) is None:
+            continue
         found = transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        if found.feasible and (words := limit.told(found.slack[0])):
-            needs.append(words)
+        slack = transfer.clear(entry, float(found.slack[0]), found.path)
+        if found.feasible and (enough := transfer.remedies([limit], slack, room=0.0)):
+            needs.append(enough)
             excess = max(excess, float(found.slack[0]))
     return Cause(needs=tuple(needs), excess=excess, zones=True) if needs else None
 

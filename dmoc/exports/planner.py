@@ -37,7 +37,7 @@ class Planner:
         """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
         start = starting_guess(problem, check_mesh(steps), order, hold, guess)
         scene = Scene(problem, scheme(order), steps, hold)
-        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds[0])
+        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds)
         return cls(scene, transcribe_onto(problem, start, units_of(problem, start)), start)
 
     @cached_property

@@ -64,7 +64,9 @@ def starting_guess(
     places = len(mesh) - 1 if hold else len(fractions)
     control, spiral = np.zeros((places, problem.controls)), False
     if given is None and problem.links:
-        position, ends = _along_links(problem, fractions)
+        from dmoc.links.along import guess_along
+
+        position, ends = guess_along(problem, fractions)
     elif given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)
     else:
@@ -85,20 +87,6 @@ def starting_guess(
     mass = np.full(len(fractions), problem.mass)
     guess = DiscretePath(mesh, order, hold, duration, position, control, mass, *ends)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
-
-
-def _along_links(problem: TransferProblem, fractions: np.ndarray) -> tuple[np.ndarray, tuple]:
-    """A path that keeps to the links, and the velocities at its ends, 0 where they are free."""
-    from dmoc.configurations.of_problem import configuration_of
-    from dmoc.links.along import along_links
-
-    (start, first), (goal, last) = problem.start.fixed(), problem.goal.fixed()
-    if np.isnan(start).any():
-        raise ValueError("a body on links needs a start whose position is known, or a guess of the path")
-    return along_links(problem, configuration_of(problem), (start, goal), fractions), (
-        np.nan_to_num(first),
-        np.nan_to_num(last),
-    )
 
 
 def _least_effort(
@@ -124,6 +112,8 @@ def _least_effort(
     position, velocity, force, mass = path(node_fractions(mesh, scheme(order)))
     position[0] = start[0]
     control = _controls_of(problem, force, mesh, order, hold)
+    if control is None:
+        return None
     return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])
 
 

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.configurations.base import Configuration
+from dmoc.configurations.of_problem import configuration_of
 
 # A path is followed in pieces of this part of the distance between its ends.
 PIECE = 0.01
@@ -21,6 +22,21 @@ ON_LINKS = 1e-12
 LOST = 0.05
 # Where a straight line is off its links by less than this part of its length, it is good enough to begin with.
 BENT = 1e-6
+
+
+def guess_along(problem: Any, fractions: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """A path that keeps to the links of a problem, and the velocities at its ends, 0 where they are free.
+
+    Raises
+    ------
+    ValueError
+        If the start is not known.
+    """
+    (start, first), (goal, last) = problem.start.fixed(), problem.goal.fixed()
+    if np.isnan(start).any():
+        raise ValueError("a body on links needs a start whose position is known, or a guess of the path")
+    path = along_links(problem, configuration_of(problem), (start, goal), fractions)
+    return path, (np.nan_to_num(first), np.nan_to_num(last))
 
 
 def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.ndarray) -> np.ndarray:

@@ -33,13 +33,20 @@ GROWTH_CONSTANT = 1.001
 NEGLIGIBLE = 0.1
 # Eigenvalues are found for this many steps with the largest h omega in any case: a report tells h omega.
 LOOKED_AT = 200
+# Steps whose h omega is below this are not looked at for the least number of steps that is stable.
+SLOWEST = 0.02
+# The least number of steps that is stable is looked for among so many, and then among so many near the last
+# one that is not: an interval of stability that is narrower than one part in forty is passed over.
+COUNTED = 300
 # A step whose h omega is below this is stable by far at any order: nothing is computed before the solve.
 HARMLESS = 0.5
 
 
+# What finds a mesh that is fine enough for the checks, too.
+OPEN = "--tol 1e-4 (in Python tol=1e-4) finds as many as the accuracy needs"
 # A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its
 # own that are off by degrees, and Ipopt finds them.
-TURN_A_STEP = {2: np.radians(30), 4: np.radians(90), 6: np.radians(90), 8: np.radians(90)}
+TURN_A_STEP = {2: np.radians(30), 4: np.radians(90), 6: np.radians(120), 8: np.radians(180)}
 
 # An exponential of a matrix is that of its part of this number, a Cayley transform, to the same power.
 SQUARED = 64
@@ -75,15 +82,22 @@ def growth_along(
     reach = h * np.maximum(fastest[:-1], fastest[1:])
     chosen = reach > NEGLIGIBLE
     chosen[np.argsort(reach)[-LOOKED_AT:]] = True
-    looked_at = np.flatnonzero(chosen)
+    # What links hold has another inertia in every place: its flow changes within a step.
+    held = bool(dynamics.configuration.joined)
+    whole = _radius_of_flow(dynamics, path, start_time, velocity) if held else np.zeros(len(h))
+    growth, frequency = _growths(flow, matrices, h, np.flatnonzero(chosen), whole)
+    return Growth(float(growth.max()), limit, float(frequency.max()), constant)
+
+
+def _growths(
+    flow: np.ndarray, matrices: np.ndarray, h: np.ndarray, looked_at: np.ndarray, whole: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Growth and h omega of some steps of lengths h [s]; the radius of the flow is at least `whole`."""
     rates = np.linalg.eigvals([flow[looked_at], flow[looked_at + 1]])
     exact = np.exp(h[looked_at] * rates.real.max(axis=(0, 2)))
-    if dynamics.configuration.joined:
-        # What links hold has another inertia in every place: its flow changes within a step.
-        exact = np.maximum(exact, _radius_of_flow(dynamics, path, start_time, velocity)[looked_at])
+    exact = np.maximum(exact, whole[looked_at])
     ours = np.abs(np.linalg.eigvals(matrices[looked_at])).max(axis=1)
-    frequency = h[looked_at] * np.abs(rates).max(axis=(0, 2))
-    return Growth(float(np.max(ours / exact)), limit, float(frequency.max()), constant)
+    return ours / exact, h[looked_at] * np.abs(rates).max(axis=(0, 2))
 
 
 def _radius_of_flow(
@@ -186,45 +200,77 @@ def _refuse_large_turns(guess: DiscretePath) -> None:
         most = np.degrees(TURN_A_STEP[guess.order])
         raise ValueError(
             f"{steps} steps of order {guess.order} turn the body by up to {most * enough / steps:.3g} degrees "
-            f"each, and no more than {most:.0f} are followed; use at least {enough} steps"
+            f"each, and no more than {most:.0f} are followed; {enough} equal steps do not; {OPEN}"
         )
 
 
-def refuse_unstable(dynamics: Dynamics, guess: DiscretePath, start_time: float, shortest: float) -> None:
+def refuse_unstable(
+    dynamics: Dynamics, guess: DiscretePath, start_time: float, bounds: tuple[float, float]
+) -> None:
     """Refuse a mesh beyond the scheme's stability limit where that is known before the solve.
 
     It is known where the linearisation does not depend on the state; elsewhere the check of the
-    solution tells.
+    solution tells. `bounds` are the shortest and the longest duration [s].
 
     Raises
     ------
     ValueError
-        With h omega, the growth per step and the number of steps that is enough.
+        With h omega, the growth per step, and from which number of steps on there is none.
     """
     _refuse_large_turns(guess)
     longest = np.diff(guess.mesh).max()
-    order, degree = guess.order, guess.order // 2
-    nodes = np.linspace(0, len(guess.position) - 1, 2 * degree + 1).round().astype(int)
-    # Where the linearisation is constant all steps of one length are alike: two of the longest one stand for
-    # all.
+    growth = _constant_growth(dynamics, guess, start_time, np.array([longest * bounds[0]]))
+    if growth is None or growth[0][0] <= GROWTH_CONSTANT:
+        return
+    steps, (enough, _) = len(guess.mesh) - 1, stable_from(dynamics, guess, start_time, bounds[1])
+    raise ValueError(
+        f"{steps} steps of order {guess.order} are unstable for this scene: h omega = {growth[1][0]:.3g}, "
+        f"errors grow {growth[0][0]:.3g} times a step; from {enough} equal steps on they do not; {OPEN}"
+    )
+
+
+def stable_from(
+    dynamics: Dynamics, guess: DiscretePath, start_time: float, duration: float
+) -> tuple[int, float]:
+    """From how many equal steps on a scheme is stable, and the angle [rad] of the fastest motion in that time.
+
+    Both are 0 where they are not known before the solve.
+    """
+    tried = _constant_growth(dynamics, guess, start_time, np.array([duration]))
+    if tried is None:
+        return 0, 0.0
+    # The number of steps is at least h omega over that of the slowest growth that is looked at.
+    counts = np.geomspace(1.0, max(tried[1][0] / SLOWEST, 2.0), COUNTED)
+    last = 0.0
+    for _ in range(2):
+        counts = np.unique(np.ceil(counts))
+        found = _constant_growth(dynamics, guess, start_time, duration / counts)
+        unstable = np.flatnonzero(found[0] > GROWTH_CONSTANT) if found else np.empty(0, int)
+        if not len(unstable):
+            break
+        last, above = counts[unstable[-1]], counts[min(unstable[-1] + 1, len(counts) - 1)]
+        counts = np.linspace(last, above, COUNTED)
+    return int(last) + 1, float(tried[1][0])
+
+
+def _constant_growth(
+    dynamics: Dynamics, guess: DiscretePath, start_time: float, lengths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Growth and h omega of steps of these lengths [s]; None where motion is not linear, or slow for all."""
+    nodes = np.linspace(0, len(guess.position) - 1, guess.order // 2 * len(lengths) + 1).round().astype(int)
+    ends = np.append(0.0, np.cumsum(lengths))
+    # Where the linearisation is constant all steps of one length are alike: one of each length stands for all.
     probe = replace(
         guess,
-        mesh=np.array([0.0, 0.5, 1.0]),
-        duration=2 * longest * shortest,
+        mesh=ends / ends[-1],
+        duration=float(ends[-1]),
         position=guess.position[nodes],
         mass=guess.mass[nodes],
-        control=np.zeros((2 if guess.hold else len(nodes), guess.control.shape[1])),
+        control=np.zeros((len(lengths) if guess.hold else len(nodes), guess.control.shape[1])),
     )
-    velocity = np.zeros((3, dynamics.freedom))
-    flow, constant = flow_matrices(dynamics, probe, start_time, velocity)
-    if not constant or longest * shortest * _rate_bound(flow).max() < HARMLESS:
-        return
+    flow, constant = flow_matrices(dynamics, probe, start_time, np.zeros((len(ends), dynamics.freedom)))
+    if not constant or not np.isfinite(flow).all() or lengths.max() * _rate_bound(flow).max() < HARMLESS:
+        return None
     matrices = step_matrices(dynamics, probe, start_time)
-    growth = growth_along(dynamics, probe, start_time, velocity, matrices)
-    if not growth.ok:
-        steps = len(guess.mesh) - 1
-        enough = int(steps * growth.frequency) + 1
-        raise ValueError(
-            f"{steps} steps of order {order} are unstable for this scene: h omega = {growth.frequency:.3g}, "
-            f"errors grow {growth.value:.3g} times a step; use at least {enough} steps"
-        )
+    matrices = np.where(np.isfinite(matrices), matrices, 1e100)
+    return _growths(flow, matrices, lengths, np.arange(len(lengths)), np.zeros(len(lengths)))

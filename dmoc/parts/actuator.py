@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.rows import Row
@@ -199,8 +200,8 @@ class Actuator(ABC):
 
     def needs(self, eased: Actuator) -> str:
         """In words, the limit of `eased`, which is enough, and the limit of this actuator, which was given."""
-        enough = up(eased.force_limit() or 0.0)
-        return f"a {self.limit_words} of {enough} N (you gave {self.force_limit():g} N)"
+        given = self.force_limit() or 1.0
+        return limit_told(self.limit_words, given, (eased.force_limit() or 0.0) / given, "N")
 
     @property
     def limit_words(self) -> str:
@@ -229,3 +230,16 @@ class Actuator(ABC):
     def words(self) -> str:
         """One line for a person."""
         return "any force, without a limit"
+
+
+def limit_told(name: str, given: float | Vector, factor: float, unit: str) -> str:
+    """The limit `factor` times the one given, which is enough, and the one given, in words.
+
+    Where axes or thrusters have limits of their own all of them are told.
+    """
+    had = entries(given) or (given,)
+    needed = [up(factor * float(value)) for value in had]
+    if len(set(had)) == 1:
+        return f"a {name} of {needed[0]} {unit} (you gave {float(had[0]):g} {unit})"
+    listed = ", ".join(f"{float(value):g}" for value in had)
+    return f"{name}s of ({', '.join(needed)}) {unit} (you gave ({listed}) {unit})"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -155,6 +156,11 @@ class Constraint(ABC):
     def eased(self, slack: float) -> Constraint | None:
         """The constraint just loose enough for rows exceeded by `slack`; None if no such constraint exists."""
         return self
+
+    def within(self, problem: Any, entry: int) -> Any:
+        """A problem with this constraint in the place of one of its own."""
+        parts = [self if i == entry else part for i, part in enumerate(problem.constraints)]
+        return replace(problem, constraints=parts)
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
         """In words, the limit that is enough; `amount` says by how much the rows give way, with its unit."""

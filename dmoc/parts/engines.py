@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, limits, number, short, times_each, vector
-from dmoc.parts.actuator import Actuator
+from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.rows import Row
 
 # Standard gravity [m/s^2] turns a specific impulse [s] into an exhaust velocity [m/s]; exact by definition.
@@ -144,6 +144,14 @@ class Engine(Burner):
         box = None if self.box is None else times_each(self.box, factor)
         return replace(self, max_thrust=factor * self.max_thrust, box=box)
 
+    def needs(self, eased: Actuator) -> str:
+        factor = (eased.force_limit() or 0.0) / self.max_thrust
+        thrust = limit_told(self.limit_words, self.max_thrust, factor, "N")
+        if self.box is None:
+            return thrust
+        box = limit_told("force limit", self.box, factor, "N")
+        return f"{thrust} and {box} along each axis"
+
     def excess(self, u: np.ndarray) -> np.ndarray:
         thrust = np.linalg.norm(u[:, :-1], axis=1)
         over = np.maximum(thrust - self.max_thrust, self.min_thrust - u[:, -1])
@@ -240,6 +248,10 @@ class Nozzles(Burner):
 
     def times(self, factor: float) -> Nozzles:
         return replace(self, max_thrust=times_each(self.max_thrust, factor))
+
+    def needs(self, eased: Actuator) -> str:
+        factor = (eased.force_limit() or 0.0) / self.force_limit()
+        return limit_told(self.limit_words, self.max_thrust, factor, "N")
 
     def words(self) -> str:
         return (

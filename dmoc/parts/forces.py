@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, limits, times_each
-from dmoc.basics.digits import up
-from dmoc.parts.actuator import Actuator
+from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.engines import Engine
 from dmoc.parts.rows import Row
 
@@ -49,7 +48,7 @@ class BoxForce(Actuator):
     def metered(self, dimension: int) -> Actuator:
         # No force in the box is larger than its diagonal, so the limit on the magnitude never acts by itself.
         limits = np.broadcast_to(np.asarray(self.limit, float), (dimension,))
-        return Engine(float(np.linalg.norm(limits)), box=self.limit)
+        return MeteredBox(float(np.linalg.norm(limits)), box=self.limit)
 
     def force_limit(self) -> float:
         return float(np.max(self.limit))
@@ -58,12 +57,8 @@ class BoxForce(Actuator):
         return BoxForce(times_each(self.limit, factor))
 
     def needs(self, eased: Actuator) -> str:
-        if not isinstance(self.limit, tuple):
-            return super().needs(eased)
         factor = (eased.force_limit() or 0.0) / self.force_limit()
-        needed = ", ".join(up(limit * factor) for limit in self.limit)
-        given = ", ".join(f"{limit:g}" for limit in self.limit)
-        return f"force limits of ({needed}) N (you gave ({given}) N)"
+        return limit_told(self.limit_words, self.limit, factor, "N")
 
     def unlimited(self) -> Actuator:
         return FreeForce()
@@ -73,6 +68,15 @@ class BoxForce(Actuator):
 
     def words(self) -> str:
         return f"a force with each component within {self.limit} N"
+
+
+@dataclass(frozen=True)
+class MeteredBox(Engine):
+    """A `BoxForce` with the magnitude of its force among the controls."""
+
+    def needs(self, eased: Actuator) -> str:
+        factor = (eased.force_limit() or 0.0) / self.max_thrust
+        return limit_told("force limit", self.box or 0.0, factor, "N")
 
 
 @dataclass(frozen=True)

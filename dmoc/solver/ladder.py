@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,10 +22,10 @@ from dmoc.nlp.solving import Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
-from dmoc.results.solution import OUT_OF_TIME, Solution
+from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung, answered, held_answer, rounded
+from dmoc.solver.rung import Rung, answered, cut_short, held_answer, rounded
 from dmoc.solver.tube import in_tube, out_of_tube
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
@@ -57,10 +58,13 @@ class Ladder:
         time_limit: float | None = None,
     ):
         self.problem, self.options, self.progress, self.compiled = problem, options, progress, compiled
-        self.dynamics = Dynamics.of(problem)
-        self.interrupt = Interrupt(time_limit)
+        self.dynamics, self.interrupt = Dynamics.of(problem), Interrupt(time_limit)
+        # Whether a problem that a message names has an answer, if somebody can say.
+        self.holds: Callable[[TransferProblem], bool] | None = None
         self._rungs: list[Rung] = []
         self._levels: list[Level] = []
+        # Takes attempts that were made elsewhere.
+        self.tell = self._levels.append
 
     @property
     def rungs(self) -> tuple[Rung, ...]:
@@ -73,7 +77,7 @@ class Ladder:
         On the coarsest mesh the guess is made anew from `given`, as the first guess was: if that one were
         carried there from a finer mesh, its controls would no longer fit its path.
         """
-        refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds[0])
+        refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds)
         order, meshes = coarse_to_fine(self.problem, first)
         known = first
         if len(meshes) > 1 and not first.multipliers:
@@ -275,23 +279,22 @@ class Ladder:
         if rung.stopped and self.interrupt.late:
             return self._out_of_time(rung, errors, **found)
         known = errors or {}
+        reason = "" if rung.cause is None or rung.solved else self._told(rung.cause)
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
-        # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
-        local = self.problem.attraction.first is not None and self.problem.attraction.lone is None
-        reason = "" if rung.cause is None else rung.cause.words(local)
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
         return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
 
+    def _told(self, cause: Cause) -> str:
+        """A cause in words, with remedies that hold; without constraints and propellant they always do."""
+        # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
+        local = self.problem.attraction.first is not None and self.problem.attraction.lone is None
+        risky = self.problem.constraints or self.problem.actuator.burns
+        return (cause.proven(self.holds) if risky and self.holds else cause).words(local)
+
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""
         answers = [one for one in self._rungs if one.solved and not one.level.question]
         best = answers[-1] if answers else replace(rung, answer=replace(rung.answer, status="failed"))
-        over = f"the time limit of {self.interrupt.seconds:g} s ended it"
-        solution = self.solution(best, errors, **found)
-        if not answers:
-            return replace(solution, message=f"{over} before any mesh was solved: give more time")
-        where = f"order {solution.order}, {solution.steps} steps"
-        told = f"{over}; this is the answer on the last mesh that was solved ({where})"
-        return replace(solution, success=False, status=OUT_OF_TIME, message=told)
+        return cut_short(self.solution(best, errors, **found), self.interrupt.seconds, bool(answers))

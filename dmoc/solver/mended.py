@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -200,7 +201,7 @@ def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
 
     Infinite where the motion cannot be integrated.
     """
-    _, extent, speed = _velocity(ladder, path)
+    _, extent, speed = velocity_and_scales(ladder, path)
     scales = replace(path_scales(path), extent=extent, speed=speed)
     missed = scales.share(*goal_miss(ladder.dynamics, path, ladder.problem.start_time))
     return float(np.nan_to_num(missed, nan=np.inf))
@@ -235,18 +236,18 @@ def _cost(rung: Rung) -> float:
 
 def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
     """What cuts deeper between nodes than is allowed."""
-    constraints = ladder.problem.constraints
-    if not constraints or not rung.solved:
+    if not ladder.problem.constraints or not rung.solved:
         return []
-    path = rung.path
-    return [
-        cut
-        for cut in cuts(constraints, path, *_velocity(ladder, path), ladder.problem.start_time)
-        if len(cut.steps)
-    ]
+    return [cut for cut in all_cuts(ladder, rung.path) if len(cut.steps)]
 
 
-def _velocity(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:
+def all_cuts(ladder: Ladder, path: DiscretePath) -> Iterator[Cut]:
+    """How far a path breaks zones and limits on the speed, at its nodes and between them."""
+    problem = ladder.problem
+    return cuts(problem.constraints, path, *velocity_and_scales(ladder, path), problem.start_time)
+
+
+def velocity_and_scales(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray, float, float]:
     """Velocities at the nodes [m/s], and the scales of a path, its extent [m] and its largest speed [m/s]."""
     _, ends = end_momenta(ladder.dynamics, path, ladder.problem.start_time)
     extent, linear = path.diagonal or 1.0, ends[:, path.coordinates.speeds]

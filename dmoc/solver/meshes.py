@@ -13,7 +13,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.stability import TURN_A_STEP, flow_matrices, steps_to_turn
+from dmoc.motion.stability import TURN_A_STEP, flow_matrices, stable_from, steps_to_turn
 from dmoc.nlp.transcription import check_mesh
 from dmoc.scene.problem import TransferProblem
 
@@ -24,8 +24,9 @@ DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
 # by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
 # goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
 A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
-# A fall past one of several attractors gets this many steps a radian at each order, and no more than that in all:
-# on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5 iterations.
+# A fall past one of several attractors gets this many steps a radian at each order, and no more than that in
+# all: on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5
+# iterations.
 A_RADIAN = {2: 40, 4: 10, 6: 5, 8: 2.5}
 MOST_PAST = {2: 1600, 4: 800, 6: 400, 8: 300}
 # A transfer of many revolutions has this order if none is asked for.
@@ -73,8 +74,9 @@ TRIAL_STEPS = 20
 UNEVEN = 5.0
 # The angle around attractors is summed up over this many steps of a guess before its mesh is graded.
 SAMPLES = 1000
-# It is summed up anew over steps of equal angles, at most so many times in all, until none of them turns by more
-# than this many times their mean [-]: between two of the equal times a body may fall past an attractor and leave.
+# It is summed up anew over steps of equal angles, at most so many times in all, until none of them turns by
+# more than this many times their mean [-]: between two of the equal times a body may fall past an attractor and
+# leave.
 GRADED, EVEN = 4, 10.0
 # A guess for a mesh of more than twice this many nodes is made on this many nodes and interpolated.
 GUESSED = 2000
@@ -100,10 +102,15 @@ def first_path(
     if steps is None and (enough := steps_to_turn(first)) > len(first.mesh) - 1:
         return starting_guess(problem, check_mesh(enough), first.order, hold, guess)
     turns = angle_around(problem, first) / (2 * np.pi)
+    errors_add_up = turns
+    if steps is None and (fastest := _unstable_angle(problem, first)):
+        turns, errors_add_up = fastest / (2 * np.pi), 1.0
     if steps is None and turns > MANY_TURNS:
         many = ORDER_OF_MANY_TURNS if turns < MOST_TURNS_OF_ORDER_6 else ORDER_OF_MORE_TURNS
         order = order or (2 if hold else many)
-        steps = max(DEFAULT_STEPS[order], int(turns * A_TURN[order] * (turns**0.5 if order == 2 else 1)))
+        steps = max(
+            DEFAULT_STEPS[order], int(turns * A_TURN[order] * (errors_add_up**0.5 if order == 2 else 1))
+        )
         first = starting_guess(problem, check_mesh(steps), order, hold, guess)
     if is_uneven(problem, first):
         if order is None:
@@ -113,6 +120,13 @@ def first_path(
         enough = max(DEFAULT_STEPS[order], steps_past(problem, first, order))
         return graded_guess(problem, steps or enough, order, hold, guess)
     return first
+
+
+def _unstable_angle(problem: TransferProblem, guess: DiscretePath) -> float:
+    """The angle [rad] of a linear motion on which the steps of a guess are unstable; else 0."""
+    dynamics, longest = Dynamics.of(problem), problem.duration_bounds[1]
+    stable, angle = stable_from(dynamics, guess, problem.start_time, longest)
+    return angle if stable > len(guess.mesh) - 1 else 0.0
 
 
 def trial_path(
@@ -125,7 +139,9 @@ def trial_path(
         return graded_guess(problem, count, order, hold, guess) if is_uneven(problem, first) else first
 
     first = on(steps or TRIAL_STEPS)
-    enough = max(2 * least_steps(problem, first), steps_to_turn(first), steps_past(problem, first, order))
+    stable, _ = stable_from(Dynamics.of(problem), first, problem.start_time, problem.duration_bounds[1])
+    followed = max(steps_to_turn(first), steps_past(problem, first, order))
+    enough = max(2 * least_steps(problem, first), 2 * stable, followed)
     return on(enough) if steps is None and enough > TRIAL_STEPS else first
 
 

@@ -14,6 +14,7 @@ from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
+from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
@@ -31,8 +32,8 @@ MOST_HOLDING = 200
 # An answer is let go by holding the next one near it, this many times as strongly [-]; where that leads nowhere
 # the root of this is tried, and the root of that.
 LESS, LEAST_LESS = 0.3, 0.7
-# Each of these attempts ends after this many iterations, those that get there take 5 to 40, and there are no more
-# than so many.
+# Each of these attempts ends after this many iterations, those that get there take 5 to 40, and there are no
+# more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 20
 
 
@@ -147,3 +148,13 @@ def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem
         return problem
     engine: Any = problem.actuator
     return replace(problem, actuator=replace(engine, smoothing=rounding))
+
+
+def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Solution:
+    """The best that there is when so many seconds were over: an answer on a coarser mesh, or an iterate."""
+    over = f"the time limit of {seconds:g} s ended it"
+    if not is_answer:
+        return replace(solution, message=f"{over} before any mesh was solved: give more time")
+    where = f"order {solution.order}, {solution.steps} steps"
+    told = f"{over}; this is the answer on the last mesh that was solved ({where})"
+    return replace(solution, success=False, status=OUT_OF_TIME, message=told)

@@ -14,6 +14,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
 from dmoc.solver.meshes import first_path
+from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.starts import compared
 from dmoc.solver.tolerance import climb_to_tolerance
@@ -94,6 +95,9 @@ def solve(
         if mesh is not None:
             raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
         tol = _tolerance(tol)
+    ladder.holds = lambda other: holds(
+        ladder, other, lambda trial: _solved(trial, order, steps, None, hold, mesh, guess)
+    )
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
         solution = _solved(ladder, order, steps, tol, hold, mesh, guess)

@@ -92,7 +92,7 @@ BAD = {
 }
 BAD["steps that turn too far"] = (
     lambda: solve(replace(turn(170), goal=Attitude(rotation((0, 0, 1), 170))), steps=3, order=2),
-    "use at least 6 steps",
+    "6 equal steps do not",
 )
 
 

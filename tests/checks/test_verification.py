@@ -483,11 +483,15 @@ def test_a_linear_scene_is_refused_beforehand_with_steps_that_work(frequency, ho
     )
     with pytest.raises(ValueError, match=f"h omega = {frequency:g}") as refusal:
         solve(scene, steps=20, hold=hold)
-    steps = int(re.search(r"use at least (\d+) steps", str(refusal.value))[1])
-    assert steps < 4 * 20 * frequency
-    solution = solve(scene, steps=steps, hold=hold)
+    steps = int(re.search(r"from (\d+) equal steps on", str(refusal.value))[1])
+    with pytest.raises(ValueError, match="unstable"):
+        solve(scene, steps=steps - 1, hold=hold)
+    solve(scene, steps=steps, hold=hold)
+    solution = solve(scene, steps=2 * steps, hold=hold)
     assert solution.success
     assert verify(solution)["stability"].ok
+    # what it names besides
+    assert "tol=1e-4" in str(refusal.value) and verify(solve(scene, tol=1e-4, hold=hold)).ok
 
 
 # corrupted in any way, a solution does not pass

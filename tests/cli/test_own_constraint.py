@@ -94,12 +94,12 @@ def test_what_is_asked_too_much_is_told_in_its_own_unit(solve):
     code, out = solve("--set", "limit=3", **CROWDED)
     assert code == 3
     needed, given = map(float, re.search(r"needs a limit of (\S+) uT \(you gave (\S+) uT\)", out).groups())
-    assert needed == pytest.approx(ENOUGH, abs=1e-3) and given == 3
+    assert ENOUGH <= needed < 1.01 * ENOUGH and given == 3
     rows = dict(re.findall(r"^field_1\[(\d+)\]\.field +(\S+ \S+)", out, re.MULTILINE))
     assert rows and all(size.endswith(" uT") for size in rows.values())
     # at the goal: the field there, over the limit
     assert float(rows["100"].split()[0]) == pytest.approx(ENOUGH - 3, rel=0.3)
-    assert solve("--set", f"limit={1.001 * needed}", "--steps", "50", **CROWDED)[0] == 0
+    assert solve("--set", f"limit={needed}", "--steps", "50", **CROWDED)[0] == 0
 
 
 def test_a_sentence_of_its_own_where_it_has_no_meaning_for_the_ends(solve):

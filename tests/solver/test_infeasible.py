@@ -1,6 +1,6 @@
-"""A transfer that cannot be made says what it lacks; one per cent more than that is enough.
+"""A transfer that cannot be made says what it lacks, and that is enough.
 
-Pass criterion: with 1 % more than the message asks for, the same problem is solved on its final mesh;
+Pass criterion: with what the message asks for, or 1 % more, the same problem is solved on its final mesh;
 with 3 % less it is not. Said after one mesh, not after all of them.
 """
 
@@ -31,6 +31,7 @@ from dmoc import (
 )
 from dmoc.nlp import elastic as relaxation
 from dmoc.scene.problem_file import load_problem
+from dmoc.solver.proven import QUESTION
 
 NUMBER = r"(-?[\d.]+(?:e[+-]?\d+)?)"
 CROSS = ((1, 0), (-1, 0), (0, 1), (0, -1))
@@ -55,8 +56,9 @@ def asked_for(solution, pattern):
 
 def on_one_mesh(failed):
     """Whether the problem itself was tried on one mesh; twice its steps tell that the mesh is not to blame."""
-    tried = {level.steps for level in failed.ladder if not level.question}
-    return len(tried) == 1 and {level.steps for level in failed.ladder} <= {*tried, 2 * max(tried)}
+    levels = [level for level in failed.ladder if level.question != QUESTION]
+    tried = {level.steps for level in levels if not level.question}
+    return len(tried) == 1 and {level.steps for level in levels} <= {*tried, 2 * max(tried)}
 
 
 # a problem with too small a limit as a function of the limit, that limit, and what is known of the one needed
@@ -189,8 +191,10 @@ def test_the_duration_that_is_enough(name):
     needed, said = asked_for(failed, "# s .you gave # s")
     assert said == given
     assert on_one_mesh(failed)
-    assert known is None or needed == pytest.approx(known, rel=5e-3)
-    assert solve(problem(1.01 * needed)).success
+    # At the very least duration a body starts at the limit of its speed at once, which no mesh follows.
+    room = 2.5e-2 if "speed" in name else 5e-3
+    assert known is None or (known <= 1.001 * needed and needed < (1 + room) * known)
+    assert solve(problem(needed)).success
     assert not solve(problem(0.97 * needed), steps=100).success
 
 
@@ -199,8 +203,8 @@ def test_the_speed_and_the_radius_that_are_enough():
         return rest_to_rest((10.0, 0.0), 5.0, constraints=[SpeedLimit(limit)])
 
     needed, _ = asked_for(solve(fast(1.5)), "speed limit of # m/s .you gave # m/s")
-    assert needed == pytest.approx(2.0, rel=1e-2)
-    assert solve(fast(1.01 * needed)).success and not solve(fast(0.97 * needed)).success
+    assert 2.0 <= needed < 2.05
+    assert solve(fast(needed)).success and not solve(fast(0.97 * needed)).success
 
     def narrow(radius):
         box = KeepIn((-1, -0.2), (5, 1.2))
@@ -210,7 +214,7 @@ def test_the_speed_and_the_radius_that_are_enough():
 
     needed, _ = asked_for(solve(narrow(1.0)), "keep-out 2 of at most # m radius .you gave # m")
     assert needed == pytest.approx(0.7, rel=1e-2)
-    assert solve(narrow(0.99 * needed)).success and not solve(narrow(1.03 * needed)).success
+    assert solve(narrow(needed)).success and not solve(narrow(1.03 * needed)).success
 
 
 def test_contradictory_conditions_are_named():
