@@ -62,7 +62,7 @@ def starting_guess(
             if (best := found(problem, mesh, order, hold, duration)) is not None:
                 return best
     places = len(mesh) - 1 if hold else len(fractions)
-    control, spiral = np.zeros((places, problem.controls)), False
+    control, spiral, ends = np.zeros((places, problem.controls)), False, ()  # type: tuple[Any, bool, Any]
     if given is None and problem.links:
         from dmoc.links.along import guess_along
 
