@@ -47,6 +47,8 @@ ORDER_OF_DEEP_FALLS = 8
 # at once. Limits take many iterations, which are cheap on 100 nodes; without limits 400 nodes at once take no
 # longer than 100 and then 400. Past an attractor 800 nodes at once took up to 120 iterations, by 200 nodes 18.
 COARSEST_NODES = {True: 100, False: 200}
+# With links and limits it is this: first attempts often fail there, and cost half as much on so few nodes.
+COARSEST_LINKED = 50
 # Each mesh has up to this many times the nodes of the one before, with limits (True) and without (False).
 FINER = {True: 4, False: 16}
 # The coarse mesh of a problem without limits has this order: its motion is smooth, and the answer is nearer to
@@ -198,7 +200,8 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
     if is_curved(problem, first):
         return first.order, [final]
     order = first.order if limited or first.hold else max(first.order, SMOOTH_ORDER)
-    counts, least = [(len(final) - 1) * (first.order // 2)], COARSEST_NODES[limited]
+    counts = [(len(final) - 1) * (first.order // 2)]
+    least = COARSEST_LINKED if problem.links and limited else COARSEST_NODES[limited]
     if counts[0] > 2 * least:
         turns = angle_around(problem, first) / (2 * np.pi)
         a_turn = order // 2 * COARSE_TURN[order] if order > 2 and turns > VERY_MANY_TURNS else 0
