@@ -1,9 +1,10 @@
 """The independent integrator is as accurate as it says: an orbit closes after a revolution."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from dmoc import PointGravity, State, TransferProblem
+from dmoc import Force, PointGravity, State, TransferProblem
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -27,3 +28,25 @@ def test_a_coast_of_one_revolution_ends_where_it_began(eccentricity, limit):
     path = DiscretePath(mesh, 2, False, period, position, zeros, mass, velocity, velocity)
     place, _ = reference(Dynamics.of(problem), path, 0.0, velocity)
     assert np.abs(place - start).max() < limit
+
+
+class Tide(Force):
+    """A push that swings with the time."""
+
+    def force(self, t, q, v, m):
+        return m * ca.vertcat(ca.cos(3 * t), 0)
+
+
+@pytest.mark.parametrize("start_time", [0.0, 0.7])
+def test_a_force_that_depends_on_the_time_acts_at_its_own_time(start_time):
+    """x'' = cos(3 t) from rest, in closed form; one long step, so that the time runs within it."""
+    duration, steps = 2.0, 2
+    still = State((0.0, 0.0), (0.0, 0.0))
+    problem = TransferProblem(1.0, still, still, duration, effects=[Tide()], start_time=start_time)
+    zeros, mass = np.zeros((steps + 1, 2)), np.ones(steps + 1)
+    path = DiscretePath(uniform_mesh(steps), 2, False, duration, zeros, zeros, mass, zeros[0], zeros[0])
+    place, speed = reference(Dynamics.of(problem), path, start_time, zeros[0])
+    begin, end = 3 * start_time, 3 * (start_time + duration)
+    assert speed[0] == pytest.approx((np.sin(end) - np.sin(begin)) / 3, abs=1e-9)
+    wanted = (np.cos(begin) - np.cos(end)) / 9 - np.sin(begin) * duration / 3
+    assert place[0] == pytest.approx(wanted, abs=1e-9)

@@ -1,0 +1,56 @@
+"""What a path says of its own size, and what it keeps when it is carried to another mesh or order."""
+
+import numpy as np
+import pytest
+
+from dmoc import rotation
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.path import INNER_MASSES, DiscretePath, Key, path_scales
+
+
+def spinning(rate, duration, steps=8):
+    """A body that turns about z at this rate [rad/s]."""
+    angles = np.degrees(rate * duration * np.linspace(0, 1, steps + 1))
+    q = np.array([rotation((0, 0, 1), angle) for angle in angles])
+    spin, mass = np.array([0.0, 0.0, rate]), np.ones(steps + 1)
+    none = np.zeros((steps + 1, 3))
+    return DiscretePath(uniform_mesh(steps), 2, False, duration, q, none, mass, spin, spin, blocks=(4,))
+
+
+@pytest.mark.parametrize(("rate", "duration"), [(0.2, 4.0), (2.0, 0.5)])
+def test_the_scales_of_a_body_that_turns_are_its_turn_and_its_rate(rate, duration):
+    scales = path_scales(spinning(rate, duration))
+    assert scales.turn == pytest.approx(rate * duration) and scales.rate == pytest.approx(rate)
+
+
+def test_the_rate_of_a_turn_from_rest_to_rest_is_its_mean():
+    path = spinning(0.5, 3.0)
+    still = DiscretePath(
+        path.mesh, 2, False, 3.0, path.position, path.control, path.mass, np.zeros(3), np.zeros(3), blocks=(4,)
+    )
+    assert path_scales(still).rate == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("old", "new"), [(6, 8), (8, 6), (4, 8)])
+def test_multipliers_within_steps_keep_their_density_at_another_order(old, new):
+    """A density of 3 is 3 times the weight of each inner node of a step, whatever the order."""
+    steps, density = 5, 3.0
+    count = steps * (old // 2) + 1
+    key = Key("step", "row", INNER_MASSES)
+    inner = np.tile(density * scheme(old).weights[1:-1], (steps, 1))
+    zeros = np.zeros((count, 1))
+    path = DiscretePath(
+        uniform_mesh(steps),
+        old,
+        False,
+        2.0,
+        zeros,
+        zeros,
+        np.ones(count),
+        np.zeros(1),
+        np.zeros(1),
+        {key: inner},
+    )
+    carried = path.onto(uniform_mesh(7), new, False).multipliers[key]
+    assert carried == pytest.approx(np.tile(density * scheme(new).weights[1:-1], (7, 1)))
