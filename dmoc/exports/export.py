@@ -106,10 +106,6 @@ def export(
     steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
     of_kind("problem", problem, TransferProblem)
     hold, c = flag("hold", hold), flag("c", c)
-    if problem.links or problem.system is not None:
-        raise ValueError(
-            "functions of bodies on links cannot be exported yet; use solve and simulate from Python"
-        )
     target = _checked_folder(as_path(folder))
     planner = Planner.of(problem, order, steps, hold, guess)
     functions = functions_of(planner, options)

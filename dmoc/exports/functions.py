@@ -46,11 +46,21 @@ class Scene:
         """Whether there is an attitude among the coordinates."""
         return bool(self.dynamics.configuration.surplus)
 
+    @property
+    def held(self) -> bool:
+        """Whether forces hold a constraint: of unit quaternions, or of links."""
+        return bool(self.dynamics.configuration.conditions)
+
     @cached_property
     def parts(self) -> dict[Part, tuple[int, int]]:
         """The parts of the body, and how many coordinates and velocities each has."""
         blocks = self.dynamics.configuration.coordinates.blocks
-        return {PARTS[block.kind]: (block.size, block.freedom) for block in blocks}
+        found: dict[Part, tuple[int, int]] = {}
+        for block in blocks:
+            # The places of several bodies stand one below the other.
+            size, freedom = found.get(PARTS[block.kind], (0, 0))
+            found[PARTS[block.kind]] = size + block.size, freedom + block.freedom
+        return found
 
     def names(self, kind: str, prefix: str = "") -> dict[str, int]:
         """What the parts of a column are called that is of one kind, a field of `Part`, and their sizes."""
@@ -68,10 +78,13 @@ class Scene:
     @cached_property
     def terms(self) -> dict[str, Term]:
         """What arguments of this scene mean where it is not what they mean in all."""
-        if not self.turns:
+        if not self.held:
             return {}
         units = dict.fromkeys(self.problem.actuator.units(self.axes))
-        return {"forces": Term(", ".join(units), TERMS["forces"].words)}
+        found = {"forces": Term(", ".join(units), TERMS["forces"].words)}
+        if not self.turns:
+            found["reactions"] = Term("m/s^2", "forces of links per unit mass, one column a node")
+        return found
 
     @property
     def controls(self) -> int:
@@ -95,7 +108,7 @@ class Scene:
         """Shape of an argument of `TERMS` that belongs to the whole path."""
         columns = self.steps if self.hold else self.nodes
         shapes = {"forces": (self.controls, columns), "masses": (1, self.nodes)}
-        shapes["reactions"] = (self.dynamics.configuration.surplus, self.nodes)
+        shapes["reactions"] = (self.dynamics.configuration.conditions, self.nodes)
         shapes |= {path: (size, self.nodes) for path, size in self.names("places").items()}
         shapes |= {path: (size, self.steps + 1) for path, size in self.names("speeds").items()}
         states = self.names("place") | self.names("speed")

@@ -134,6 +134,11 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
         if isinstance(value, Boundary):
             # An end of a body that carries wheels is one of the body alone, and the wheels.
             yield from _numbers_of_part(value, owner, partial(_put_inside, put, part, field))
+        if isinstance(value, tuple) and value and all(isinstance(one, Boundary) for one in value):
+            for i, one in enumerate(value):
+                inside = partial(_put_among, put, part, field, i)
+                yield from _numbers_of_part(one, f"{owner}_{part.names[i]}", inside)
+            continue
         words = f"{called.replace('_', ' ')} of the {owner.replace('_', ' ')} ({type(part).__name__})"
         if _is_number(value):
             free = "; entries that the problem leaves free are ignored" if None in np.atleast_1d(value) else ""
@@ -142,6 +147,11 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
 
 def _put_inside(put: Callable[[Any], TransferProblem], part: Any, field: str, twin: Any) -> TransferProblem:
     return put(_with(part, field, twin))
+
+
+def _put_among(put: Callable, part: Any, field: str, place: int, twin: Any) -> TransferProblem:
+    before = getattr(part, field)
+    return put(_with(part, field, (*before[:place], twin, *before[place + 1 :])))
 
 
 def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], TransferProblem]) -> Number:

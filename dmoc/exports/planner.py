@@ -77,7 +77,7 @@ class Planner:
         """The arguments that make up a plan, without its multipliers."""
         scene = self.scene
         more = (
-            ["reactions"] * scene.turns + ["masses"] * scene.burns + ["duration"] * scene.problem.free_duration
+            ["reactions"] * scene.held + ["masses"] * scene.burns + ["duration"] * scene.problem.free_duration
         )
         return [*scene.names("places"), *scene.names("speeds"), "forces", *more]
 
@@ -108,7 +108,7 @@ class Planner:
         states = scene.parted(found["position"] + ca.DM(self.nlp.units.origin), "places")
         for end in ("start", "goal"):
             states |= scene.parted(found[f"{end}.velocity"], "speed", f"{end}_")
-        reactions = {"reactions": found["reaction"]} if scene.turns else {}
+        reactions = {"reactions": found["reaction"]} if scene.held else {}
         return (
             mass
             | states
@@ -141,7 +141,7 @@ def cost(planner: Planner) -> Exported:
     # no cost looks at velocities but those of the ends, or at reactions
     ends = ca.horzcat(*[scene.joined(path, "speed", end) for end in ("start_", "goal_")])
     plan = path | scene.parted(ends, "speeds")
-    if scene.turns:
+    if scene.held:
         plan["reactions"] = ca.MX.zeros(*scene.shape("reactions"))
     given = {name: symbol for name, symbol in planner.numbers.symbols().items() if name not in path} | path
     _, _, p = planner.numbers.bounds_and_parameters(given)
@@ -221,7 +221,16 @@ def _of_one_sign(numbers: dict[str, ca.MX], plan: dict[str, ca.MX]) -> dict[str,
 
 
 def _largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
-    """The largest angle between neighbouring nodes of a body that turns."""
+    """The largest angle between neighbouring nodes of a body that turns, or of a link."""
+    body = scene.dynamics.configuration
+    if body.joined:
+        bars = scene.dynamics.bars.map(scene.nodes)(scene.joined(path, "places"))
+        cosine: Any = 1
+        for row in range(body.joined):
+            ways = ca.reshape(bars[row, :].T, body.freedom, scene.nodes)
+            ways = ways / ca.repmat(ca.sqrt(ca.sum1(ways * ways)), body.freedom, 1)
+            cosine = ca.fmin(cosine, ca.mmin(ca.sum1(ways[:, 1:] * ways[:, :-1])))
+        return {"largest_turn": ca.acos(ca.fmax(cosine, -1))}
     if not scene.turns:
         return {}
     q = path[ATTITUDE.places]
@@ -274,6 +283,7 @@ def _solver_terms(planner: Planner) -> dict[str, Term]:
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
         "largest_residual_torque": Term("N m", "largest defect of the discrete equations of the turn"),
         "largest_residual_wheels": Term("N m", "largest defect of the discrete equations of wheels"),
+        "largest_residual_links": Term("m", "largest gap of a link"),
         "largest_residual_norm": Term("-", "largest |q.q - 1| of the quaternions"),
         "largest_turn": Term("rad", "largest turn between neighbouring nodes; from pi/2 on the plan is wrong"),
         "violation": Term(

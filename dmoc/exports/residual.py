@@ -7,6 +7,7 @@ import numpy as np
 
 from dmoc.exports.functions import Scene
 from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
+from dmoc.motion.mesh import node_fractions
 from dmoc.motion.momenta import legendre_function
 
 
@@ -57,9 +58,16 @@ def _along(scene: Scene) -> ca.Function:
 def residual_of(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
     """Defect of the discrete Euler-Lagrange equations at every node, as a force [N] and a torque [N m].
 
-    Where the body turns, what breaks q.q = 1 is beside it.
+    Where the body turns, what breaks q.q = 1 is beside it, where links hold it, their gaps are.
     """
-    found = scene.parted(_defect(scene, path), "residual")
+    body, defect = scene.dynamics.configuration, _defect(scene, path)
+    if body.joined:
+        defect = _without_reactions(scene, path, defect)
+    found = scene.parted(defect, "residual")
+    if body.joined:
+        q = ca.SX.sym("q", body.size)
+        gaps = ca.Function("gaps", [q], [ca.densify(body.links_at(q))])
+        found["residual_links"] = gaps.map(scene.nodes)(scene.joined(path, "places"))
     if scene.turns:
         q = path[ATTITUDE.places]
         found["residual_norm"] = ca.sum1(q * q) - 1
@@ -95,6 +103,15 @@ def _defect(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     return rows / (ca.repmat(1 - turning, 1, scene.nodes) + turning @ share)
 
 
+def _without_reactions(scene: Scene, path: dict[str, ca.MX], rows: ca.MX) -> ca.MX:
+    """Rows at every node without what the reactions of links take up."""
+    fractions = node_fractions(np.linspace(0.0, 1.0, scene.steps + 1), scene.rule)
+    times = path["start_time"] + path["duration"] * ca.DM(fractions).T
+    mass = path["masses"] if scene.burns else path["mass"]
+    tangential = scene.dynamics.tangential.map(scene.nodes)
+    return tangential(times, scene.joined(path, "places"), mass, rows)
+
+
 def _scaled_rows(rows: ca.MX, factor: ca.MX, axes: int) -> ca.MX:
     """Rows times a number, or times one number a column."""
     return rows * (factor if factor.is_scalar() else ca.repmat(factor, axes, 1))
@@ -122,7 +139,7 @@ def residual_jacobian(scene: Scene) -> Exported:
         for name, symbol in path.items():
             slope = ca.jacobian(ca.vec(rows), ca.vec(symbol))
             # the length of quaternions depends on nothing else
-            if part != "residual_norm" or slope.nnz():
+            if part not in ("residual_norm", "residual_links") or slope.nnz():
                 outputs[f"{prefix}by_{name}"] = slope
                 terms[f"{prefix}by_{name}"] = _slope_term(scene, part, name)
     return Exported(named("residual_jacobian", path, outputs), "sparse derivatives of the residual", terms)

@@ -97,6 +97,7 @@ TERMS = {
     "start_wheel_momentum": Term("N m s", "angular momenta of wheels at the start"),
     "goal_wheel_momentum": Term("N m s", "angular momenta of wheels at the goal"),
     "residual_wheels": Term("N m", "motor torque minus what the discrete motion needs, one column a node"),
+    "residual_links": Term("m", "gaps of the links at every node"),
     "residual_norm": Term("-", "q.q - 1 of the quaternion at every node"),
     "reactions": Term("m^2/s^2", "forces per unit mass that keep the quaternions unit ones, one column a node"),
 }

@@ -1,0 +1,64 @@
+"""Functions of bodies on links, taken away and used without the package's own solve."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from dmoc import export, simulate, solve
+from dmoc.scene.problem_file import load_problem
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm") / "functions"
+    problem = load_problem("arm_reach").make()
+    export(problem, folder, order=4, steps=20, c=False)
+    return problem, lambda name: ca.Function.load(str(folder / f"{name}.casadi"))
+
+
+def test_the_solver_finds_the_same_and_takes_other_ends(arm):
+    _, take = arm
+    solver, nominal = take("solver"), take("nominal")
+    given = {name: value for name, value in nominal.call({}).items() if name in solver.name_in()}
+    for angles in ((1.2, 2.0), (1.0, 1.5)):
+        other = load_problem("arm_reach").make(upper=angles[0], lower=angles[1])
+        for name in ("elbow", "hand"):
+            state = dict(zip(other.goal.names, other.goal.states, strict=True))[name]
+            given[f"goal_{name}_position"] = ca.DM(state.position)
+        plan, found = solver.call(given), solve(other, order=4, steps=20)
+        assert float(plan["objective"]) == pytest.approx(found.objective, rel=1e-6)
+        np.testing.assert_allclose(plan["positions"].full().T, found.position, atol=1e-6)
+        np.testing.assert_allclose(plan["reactions"].full().T, found.path.reaction, atol=1e-4)
+        assert float(plan["largest_residual"]) < 1e-8 and float(plan["largest_residual_links"]) < 1e-9
+        assert 0 < float(plan["largest_turn"]) < np.pi / 2
+
+
+def test_step_and_residual_are_those_of_a_simulation(arm):
+    problem, take = arm
+    push = 0.3 * np.random.default_rng(2).normal(size=(41, 2))
+    flight = simulate(problem, push, 20, 4)
+    step, residual = take("step"), take("residual")
+    first = step(
+        position=flight.position[0],
+        velocity=flight.velocity[0],
+        mass=problem.mass,
+        time=0.0,
+        time_step=problem.duration / 20,
+        forces=push[:3].T,
+    )
+    np.testing.assert_allclose(first["next_position"].full().ravel(), flight.position[1], atol=1e-13)
+    np.testing.assert_allclose(first["next_velocity"].full().ravel(), flight.velocity[1], atol=1e-12)
+    found = solve(problem, order=4, steps=20)
+    given = {
+        "positions": found.position.T,
+        "start_velocity": found.velocity[0],
+        "goal_velocity": found.velocity[-1],
+        "forces": found.path.control.T,
+        "mass": problem.mass,
+        "start_time": 0.0,
+        "duration": problem.duration,
+    }
+    left = residual.call(given)
+    assert np.abs(left["residual"].full()).max() < 1e-8
+    given["positions"] = given["positions"] + 1e-3
+    assert np.abs(residual.call(given)["residual_links"].full()).max() > 1e-4
