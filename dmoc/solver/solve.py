@@ -11,6 +11,7 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
+from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
 from dmoc.solver.meshes import first_path
@@ -129,7 +130,8 @@ def _solved(
     order = order or (None if best is None else best.nlp.scheme.order)
     first = first_path(problem, order, steps, hold, guess, mesh)
     pinned, given = best is not None and best.pinned, guess
-    rung = ladder.climb_to(first, given) if best is None else ladder.refine_on(first, pinned)
+    flat = flat_optimum(ladder, first) if best is None else ladder.refine_on(first, pinned)
+    rung = ladder.climb_to(first, given) if flat is None else flat
     is_open = steps is None and mesh is None
     if is_open and best is None:
         rung, first = on_shorter_steps(ladder, rung, first, given)

@@ -16,6 +16,7 @@ from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, has_linear_controls, is_singular, switch_times
 from dmoc.scene.problem import TransferProblem
+from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
@@ -76,7 +77,9 @@ def climb_to_tolerance(
     the change there tells the error.
     """
     first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
-    trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
+    trial = flat_optimum(ladder, first)
+    if trial is None:
+        trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
     trial = past_zones(ladder, trial, first, guess, refined=True)
     if not trial.solved:
         return ladder.solution(trial, tolerance=tol)
@@ -117,6 +120,8 @@ class _Refinement:
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
         longest = np.diff(rung.nlp.mesh).max()
+        if rung.pull > 0:
+            self.lean = min(HELD * self.tol, MOST_HELD)
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
