@@ -6,7 +6,20 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from dmoc import BallForce, Engine, Moving, State, TransferProblem, UniformGravity, solve, verify
+from dmoc import (
+    Attitude,
+    BallForce,
+    Engine,
+    Moving,
+    State,
+    Torque,
+    TransferProblem,
+    UniformGravity,
+    rotation,
+    solve,
+    verify,
+)
+from dmoc.checks.balances import balance
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.limits import excesses
 
@@ -69,3 +82,12 @@ def test_far_from_the_origin_rounding_is_allowed_for():
     ends = State((far,), (1.0,)), State((far + 1.0,), (1.0,))
     check = verify(solve(TransferProblem(1.0, *ends, duration), steps=steps))["residual"]
     assert check.limit == pytest.approx(10 * np.finfo(float).eps * far * (steps / duration) ** 2, rel=1e-3)
+
+
+def test_a_torque_that_the_angular_momentum_does_not_show_breaks_its_balance():
+    ends = Attitude((1, 0, 0, 0)), Attitude(rotation((1, 2, 1), 90))
+    found = solve(TransferProblem(1.0, *ends, 4.0, inertia=(1, 2, 2.5), actuator=Torque()), order=4, steps=10)
+    assert balance(Evidence(found))[0] < 1e-10
+    control = found.path.control.copy()
+    control[7] += 1e-4
+    assert balance(Evidence(replace(found, path=replace(found.path, control=control))))[0] > 1e-6
