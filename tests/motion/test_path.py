@@ -1,5 +1,7 @@
 """What a path says of its own size, and what it keeps when it is carried to another mesh or order."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,3 +56,31 @@ def test_multipliers_within_steps_keep_their_density_at_another_order(old, new):
     )
     carried = path.onto(uniform_mesh(7), new, False).multipliers[key]
     assert carried == pytest.approx(np.tile(density * scheme(new).weights[1:-1], (7, 1)))
+
+
+def straight(steps, order=2):
+    """A body that coasts along a straight line at (3, 4) m/s for 2 s."""
+    fractions = np.linspace(0, 1, steps * (order // 2) + 1)
+    position, speed = fractions[:, None] * [6.0, 8.0] + [1.0, -1.0], np.array([3.0, 4.0])
+    zeros, mass = np.zeros_like(position), np.ones(len(position))
+    return DiscretePath(uniform_mesh(steps), order, False, 2.0, position, zeros, mass, speed, speed)
+
+
+@pytest.mark.parametrize("steps", [3, 7, 40])
+def test_a_straight_line_stays_one_on_any_mesh_with_its_ends_to_the_last_bit(steps):
+    path = straight(9)
+    moved = path.onto(uniform_mesh(steps), 2, False)
+    assert moved.position == pytest.approx(np.linspace(0, 1, steps + 1)[:, None] * [6.0, 8.0] + [1.0, -1.0])
+    assert (moved.position[[0, -1]] == path.position[[0, -1]]).all()
+
+
+def test_a_path_of_no_extent_is_measured_by_what_its_speed_would_cover():
+    path = straight(4)
+    scales = path_scales(replace(path, position=0 * path.position))
+    assert scales.extent == pytest.approx(5.0 * 2.0) and scales.speed == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("order", [True, 2.0, 3, "4", None])
+def test_an_order_is_one_of_four_whole_numbers(order):
+    with pytest.raises(ValueError, match="one of 2, 4, 6, 8"):
+        scheme(order)

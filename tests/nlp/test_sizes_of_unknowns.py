@@ -37,3 +37,14 @@ def test_the_unit_of_cost_is_that_of_the_unit_of_force_all_the_way(duration):
     # All nozzles of a cross at once make no force, one of them does.
     units = transcribe(TransferProblem(1.0, *ends, duration, actuator=Nozzles(CROSS, 2.0)), 6).units
     assert units.cost == pytest.approx(0.5 * units.force**2 * duration)
+
+
+@pytest.mark.parametrize("mass", [0.5, 40.0])
+@pytest.mark.parametrize("duration", [0.2, 5.0])
+def test_the_unit_of_force_moves_the_mass_over_the_path_in_its_time(mass, duration):
+    """Or changes the velocities of its ends into the mean one, if that takes more."""
+    slow = TransferProblem(mass, State((0, 0), (0, 0)), State((3, 4), (0, 0)), duration)
+    assert transcribe(slow, 6).units.force == pytest.approx(mass * 5.0 / duration**2)
+    fast = TransferProblem(mass, State((0, 0), (300, 400)), State((3, 4), (0, 0)), duration)
+    turned = np.hypot(300 - 3 / duration, 400 - 4 / duration)
+    assert transcribe(fast, 6).units.force == pytest.approx(mass * turned / duration)
