@@ -14,8 +14,8 @@ from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
 from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
-# There is thrust to spare if the path of least effort needs less than this part of the largest thrust [-]: where
-# it needs more, least fuel has burns at places that cost decides on.
+# There is thrust to spare if the path of least effort needs less than this part of the largest thrust [-]:
+# where it needs more, least fuel has burns at places that cost decides on.
 TO_SPARE = 0.3
 # Least effort takes this many iterations at most: of twelve transfers eleven took 22 to 73.
 MOST_EFFORT = 100
@@ -26,8 +26,8 @@ MOST_NEAR = 60
 def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
     """An answer on the mesh of a guess that is held near the path of least effort, or None.
 
-    From a spiral Ipopt wanders among paths of nearly the same fuel, for hundreds of iterations. Least effort has
-    one optimum near by; held near it, and near each other as |F| is rounded less, least fuel takes about five
+    From a spiral Ipopt wanders among paths of nearly the same fuel, for hundreds of iterations. Least effort
+    has one optimum near by; held near it, and near each other as |F| is rounded less, least fuel takes about five
     iterations each time and lies a thousandth above its optimum.
     """
     problem = ladder.problem
