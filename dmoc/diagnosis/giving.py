@@ -154,11 +154,11 @@ class Limits:
         scale, unit = float(groups[0].scales.max()), groups[0].units[0]
 
         def told(slack: float) -> str:
-            eased = zone.eased(slack)
+            eased = zone.eased(slack / scale)
             return zone.needs(eased, entry + 1, f"{up(slack / scale)} {unit}".strip()) if eased else ""
 
         def change(problem: TransferProblem, slack: float) -> TransferProblem:
-            return _with_constraint(problem, entry, zone.eased(slack))
+            return _with_constraint(problem, entry, zone.eased(slack / scale))
 
         return self._giving(told, change, lambda slack: 1 + slack, groups)
 

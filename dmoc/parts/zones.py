@@ -29,8 +29,7 @@ class KeepOut(Constraint):
     radius : float
         Radius [m].
     point : sequence of float, optional
-        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
-        not given.
+        Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
     """
 
     center: Vector
@@ -96,8 +95,7 @@ class KeepIn(Constraint):
     lower, upper : sequence of float
         Opposite corners [m]; entries may be -inf and inf.
     point : sequence of float, optional
-        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
-        not given.
+        Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
     """
 
     lower: Vector
@@ -155,6 +153,9 @@ class KeepIn(Constraint):
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, np.maximum(self.lower - q, q - self.upper)).max(axis=1)
 
+    def eased(self, slack: float) -> KeepIn:
+        return replace(self, lower=np.subtract(self.lower, slack), upper=np.add(self.upper, slack))
+
     def words(self) -> str:
         return f"stays between {_place(self.lower)} and {_place(self.upper)}{self.of_point}"
 
@@ -180,8 +181,7 @@ class ApproachCone(Constraint):
     rounding : float
         [m].
     point : sequence of float, optional
-        Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
-        not given.
+        Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
     """
 
     # A vector, or a function of the time.

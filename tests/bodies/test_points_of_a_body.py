@@ -150,13 +150,12 @@ def test_words_and_refusals_speak_of_the_point():
         TransferProblem(1.0, *ends, 6.0, actuator=Torque(), inertia=J, constraints=[BALL])
 
 
-def test_what_the_point_would_need_is_named():
-    """However the rod is turned at the goal, its tip is no nearer than 2.2 m, and the wall stands at 2 m."""
-    wall = KeepIn((-9, -9, -9), (2.0, 9, 9), point=TIP)
-    free = Pose((3, 0, 0), attitude=None)
-    start = Pose((0, 0, 0), attitude=rotation((0, 0, 1), 60))
-    failed = solve(replace(rod(), start=start, goal=free, constraints=[wall]), order=2, steps=10)
-    assert not failed.success and "constraint 1, KeepIn, to give way by 0.2" in failed.message
+def test_zones_of_a_point_give_way_as_those_of_the_centre_do():
+    """The point stays; walls move by metres, a sphere shrinks by the root of its row."""
+    wall = KeepIn((-9, -9, -9), (2.0, np.inf, 9), point=TIP)
+    assert wall.eased(0.2) == KeepIn((-9.2, -9.2, -9.2), (2.2, np.inf, 9.2), point=TIP)
+    assert wall.needs(wall.eased(0.2), 1, "0.2 m") == "constraint 1, KeepIn, to give way by 0.2 m"
+    assert BALL.eased(0.19) == KeepOut(CENTER, RADIUS * 0.9, point=TIP)
 
 
 def test_the_path_of_the_point_is_drawn():
