@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.exports.functions import Scene, rows_of
 from dmoc.exports.numbers import Numbers
-from dmoc.exports.residual import path_symbols, residual_of, velocities_of
+from dmoc.exports.residual import largest_turn, path_symbols, residual_of, velocities_of
 from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
@@ -201,7 +201,7 @@ def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX
         "objective": planner.nlp.objective(found["f"]),  # type: ignore[arg-type, dict-item]
         **residual,
         **largest,
-        **_largest_turn(planner.scene, path),
+        **largest_turn(planner.scene, path),
     }
 
 
@@ -218,24 +218,6 @@ def _of_one_sign(numbers: dict[str, ca.MX], plan: dict[str, ca.MX]) -> dict[str,
             along = ca.dot(q, plan[ATTITUDE.places][:, place])
             made[name] = q / ca.norm_2(q) * ca.if_else(along < 0, -1, 1)
     return made
-
-
-def _largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
-    """The largest angle between neighbouring nodes of a body that turns, or of a link."""
-    body = scene.dynamics.configuration
-    if body.joined:
-        bars = scene.dynamics.bars.map(scene.nodes)(scene.joined(path, "places"))
-        cosine: Any = 1
-        for row in range(body.joined):
-            ways = ca.reshape(bars[row, :].T, body.freedom, scene.nodes)
-            ways = ways / ca.repmat(ca.sqrt(ca.sum1(ways * ways)), body.freedom, 1)
-            cosine = ca.fmin(cosine, ca.mmin(ca.sum1(ways[:, 1:] * ways[:, :-1])))
-        return {"largest_turn": ca.acos(ca.fmax(cosine, -1))}
-    if not scene.turns:
-        return {}
-    q = path[ATTITUDE.places]
-    cosines = ca.sum1(q[:, 1:] * q[:, :-1])
-    return {"largest_turn": 2 * ca.acos(ca.fmax(ca.fmin(ca.mmin(cosines), 1), -1))}
 
 
 def nominal(planner: Planner) -> Exported:

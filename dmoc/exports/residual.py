@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -161,3 +163,21 @@ def velocities_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     mass = path["masses"][:, ends] if scene.burns else path["mass"]
     velocity = scene.dynamics.velocity.map(scene.steps + 1)
     return velocity(times, scene.joined(path, "places")[:, ends], p, mass)
+
+
+def largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
+    """The largest angle between neighbouring nodes of a body that turns, or of a link."""
+    body = scene.dynamics.configuration
+    if body.joined:
+        bars = scene.dynamics.bars.map(scene.nodes)(scene.joined(path, "places"))
+        cosine: Any = 1
+        for row in range(body.joined):
+            ways = ca.reshape(bars[row, :].T, body.freedom, scene.nodes)
+            ways = ways / ca.repmat(ca.sqrt(ca.sum1(ways * ways)), body.freedom, 1)
+            cosine = ca.fmin(cosine, ca.mmin(ca.sum1(ways[:, 1:] * ways[:, :-1])))
+        return {"largest_turn": ca.acos(ca.fmax(cosine, -1))}
+    if not scene.turns:
+        return {}
+    q = path[ATTITUDE.places]
+    cosines = ca.sum1(q[:, 1:] * q[:, :-1])
+    return {"largest_turn": 2 * ca.acos(ca.fmax(ca.fmin(ca.mmin(cosines), 1), -1))}

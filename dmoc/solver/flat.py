@@ -27,8 +27,8 @@ def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
     """An answer on the mesh of a guess that is held near the path of least effort, or None.
 
     From a spiral Ipopt wanders among paths of nearly the same fuel, for hundreds of iterations. Least effort
-    has one optimum near by; held near it, and near each other as |F| is rounded less, least fuel takes about five
-    iterations each time and lies a thousandth above its optimum.
+    has one optimum near by; held near it, and near each other as |F| is rounded less, least fuel takes about
+    five iterations each time and lies a thousandth above its optimum.
     """
     problem = ladder.problem
     if not _may_be_flat(problem) or first.multipliers:

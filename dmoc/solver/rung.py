@@ -117,8 +117,8 @@ def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
     """An optimum from an answer that was held so strongly; None if there is no way to it in a few attempts.
 
     Each answer is held near the one before, and begins with its multipliers: a switch then moves by little.
-    Every second one is held as strongly as the one before it, which ends up nearer to the optimum, and the next one
-    less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered.
+    Every second one is held as strongly as the one before it, which ends up nearer to the optimum, and the next
+    one less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered.
     """
     share = LESS
     for _ in range(MOST_LET_GO):
