@@ -101,6 +101,16 @@ def end(names):
     assert not late.ok and late.note == "worst: goal kerb"
 
 
+def link(names):
+    """The bead keeps to its wire, and on a line that is level the wire carries its weight."""
+    bead, wire = names["bead"], names["Wire"]
+    assert np.abs(bead.position[:, 1] - bead.position[:, 0] ** 2).max() < 1e-10
+    assert dmoc.verify(bead).ok and names["push"].shape == (len(bead.time), 1)
+    level = dmoc.State((0, 0), (0, 0))
+    still = dmoc.solve(replace(bead.problem, start=level, goal=level, links=[wire(0.0)]))
+    assert still.reaction == pytest.approx(np.full_like(still.reaction, -9.81), rel=1e-9)
+
+
 def check(names):
     """The largest power of least effort from rest to rest is sqrt(3) m d^2 / (T^3 / 8) / 2 here: sqrt(3) W."""
     report = names["report"]
@@ -129,6 +139,7 @@ RIGHT = {
     "An actuator": actuator,
     "An objective": objective,
     "A constraint": constraint,
+    "A link": link,
     "An end condition": end,
     "A check": check,
     "Another method": method,
