@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from dmoc import rotation
+from dmoc.configurations.coordinates import Coordinates
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.motion.path import INNER_MASSES, DiscretePath, Key, path_scales
+from dmoc.motion.path import INNER_MASSES, DiscretePath, Key
+from dmoc.motion.scales import path_scales
 
 
 def spinning(rate, duration, steps=8):
@@ -17,7 +19,9 @@ def spinning(rate, duration, steps=8):
     q = np.array([rotation((0, 0, 1), angle) for angle in angles])
     spin, mass = np.array([0.0, 0.0, rate]), np.ones(steps + 1)
     none = np.zeros((steps + 1, 3))
-    return DiscretePath(uniform_mesh(steps), 2, False, duration, q, none, mass, spin, spin, blocks=(4,))
+    return DiscretePath(
+        uniform_mesh(steps), 2, False, duration, q, none, mass, spin, spin, made_of=Coordinates.of_rigid_body(0)
+    )
 
 
 @pytest.mark.parametrize(("rate", "duration"), [(0.2, 4.0), (2.0, 0.5)])
@@ -29,7 +33,16 @@ def test_the_scales_of_a_body_that_turns_are_its_turn_and_its_rate(rate, duratio
 def test_the_rate_of_a_turn_from_rest_to_rest_is_its_mean():
     path = spinning(0.5, 3.0)
     still = DiscretePath(
-        path.mesh, 2, False, 3.0, path.position, path.control, path.mass, np.zeros(3), np.zeros(3), blocks=(4,)
+        path.mesh,
+        2,
+        False,
+        3.0,
+        path.position,
+        path.control,
+        path.mass,
+        np.zeros(3),
+        np.zeros(3),
+        made_of=Coordinates.of_rigid_body(0),
     )
     assert path_scales(still).rate == pytest.approx(0.5)
 

@@ -74,3 +74,27 @@ def test_a_start_outside_the_cone_is_refused():
     cone = ApproachCone((0, 0), (1, 0), 0.5)
     with pytest.raises(ValueError, match="cone"):
         TransferProblem(1.0, State((1, 2), (0, 0)), State((0, 0), (0, 0)), 5.0, constraints=[cone])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("time", [0.0, 2.0, 5.0])
+def test_a_cone_that_moves_is_at_each_time_the_one_that_stands_there(dimension, time):
+    """Its rows and its excess, with an apex that runs and an axis that turns."""
+
+    def apex(t):
+        return ca.vertcat(1 + 0.5 * t, -t, 2)[:dimension]
+
+    def axis(t):
+        return ca.vertcat(ca.cos(0.3 * t), ca.sin(0.3 * t), 0)[:dimension]
+
+    there, along = (np.array(ca.DM(part(time))).ravel() for part in (apex, axis))
+    moving, standing = ApproachCone(apex, axis, ANGLE), ApproachCone(there, along, ANGLE)
+    t, q = ca.SX.sym("t"), ca.SX.sym("q", dimension)
+    rows = [ca.vertcat(*[row.expression for row in cone.rows(t, q, None, 1)]) for cone in (moving, standing)]
+    function = ca.Function("rows", [t, q], rows)
+    places = there + np.random.default_rng(1).normal(size=(20, dimension))
+    for place in places:
+        one, other = (x.full() for x in function(time, place))
+        assert one == pytest.approx(other, abs=1e-12)
+    found = moving.excess_at(np.full(20, time), places, None)
+    assert found == pytest.approx(standing.excess(places, None), abs=1e-12) and found.max() > 0.1

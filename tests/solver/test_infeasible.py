@@ -29,7 +29,7 @@ from dmoc import (
     solve,
     three_body,
 )
-from dmoc.nlp import elastic as relaxation
+from dmoc.diagnosis import elastic as relaxation
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.proven import QUESTION
 
