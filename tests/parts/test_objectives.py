@@ -76,6 +76,7 @@ def ascent(objective, goal, duration=(0.5, 20.0), thrust=THRUST):
     return TransferProblem(1.0, start, goal, duration, effects=[pull], actuator=engine, objective=objective)
 
 
+@pytest.mark.slow
 def test_the_highest_vertical_ascent():
     """All propellant at full thrust, then a coast: no drag asks for anything else (Tsiolkovsky)."""
     burn = (1.0 - DRY) * EXHAUST / THRUST

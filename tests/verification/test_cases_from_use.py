@@ -277,6 +277,7 @@ def test_an_ascent_through_the_air():
     assert certified(ascent()).objective == pytest.approx(88_900, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_power_from_sunlight():
     solution = certified(power_from_sunlight())
     assert solution.objective == pytest.approx(0.51, rel=1e-3)
