@@ -13,7 +13,6 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
-from dmoc.solver.tube import in_tube, out_of_tube
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
@@ -26,6 +25,7 @@ from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
 from dmoc.solver.rung import Rung, answered, held_answer, rounded
+from dmoc.solver.tube import in_tube, out_of_tube
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000

@@ -24,8 +24,9 @@ DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
 # by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
 # goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
 A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
-# A fall past one of several attractors gets this many steps a radian at each order, and no more than that in all:
-# on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5 iterations.
+# A fall past one of several attractors gets this many steps a radian at each order, and no more than that in
+# all: on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5
+# iterations.
 A_RADIAN = {2: 40, 4: 10, 6: 5, 8: 2.5}
 MOST_PAST = {2: 1600, 4: 800, 6: 400, 8: 300}
 # A transfer of many revolutions has this order if none is asked for.
@@ -73,8 +74,9 @@ TRIAL_STEPS = 20
 UNEVEN = 5.0
 # The angle around attractors is summed up over this many steps of a guess before its mesh is graded.
 SAMPLES = 1000
-# It is summed up anew over steps of equal angles, at most so many times in all, until none of them turns by more
-# than this many times their mean [-]: between two of the equal times a body may fall past an attractor and leave.
+# It is summed up anew over steps of equal angles, at most so many times in all, until none of them turns by
+# more than this many times their mean [-]: between two of the equal times a body may fall past an attractor and
+# leave.
 GRADED, EVEN = 4, 10.0
 # A guess for a mesh of more than twice this many nodes is made on this many nodes and interpolated.
 GUESSED = 2000

@@ -31,8 +31,8 @@ MOST_HOLDING = 200
 # An answer is let go by holding the next one near it, this many times as strongly [-]; where that leads nowhere
 # the root of this is tried, and the root of that.
 LESS, LEAST_LESS = 0.3, 0.7
-# Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no more
-# than so many.
+# Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
+# more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
 
 
@@ -115,9 +115,9 @@ def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: Di
 def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
     """An optimum from an answer that was held so strongly; None if there is no way to it in a few attempts.
 
-    Each answer is held near the one before, and begins with its multipliers: a switch then moves by little. Every
-    second one is held as strongly as the one before it, which ends up nearer to the optimum, and the next one
-    less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered.
+    Each answer is held near the one before, and begins with its multipliers: a switch then moves by little.
+    Every second one is held as strongly as the one before it, which ends up nearer to the optimum, and the next
+    one less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered.
     """
     share = LESS
     for _ in range(MOST_LET_GO):
