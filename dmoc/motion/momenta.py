@@ -220,3 +220,31 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
 
     momenta = step_momenta(rule, point, t, h, nodes, ca.vertsplit(m), push, body, origin)
     return ca.Function("legendre", [q, m, u, t, h, origin], momenta)
+
+
+def flow_between_links(
+    dynamics: Dynamics, position: np.ndarray, velocity: np.ndarray, flow: np.ndarray
+) -> np.ndarray:
+    """The flow in the ways that links let be, in bases B that turn along with them as little as they must.
+
+    With the slope C of the links, D = d(C w)/dq and the right inverse C+ = M^-1 C' (C M^-1 C')^-1, a small
+    change is dq = B e, dw = B h - C+ D B e, and B changes by -C+ D B. Since B' M B = 1, h = B' M dw.
+    """
+    n, held = dynamics.freedom, dynamics.configuration.joined
+    q, w = ca.SX.sym("q", dynamics.positions), ca.SX.sym("w", n)
+    body = dynamics.configuration
+    turning = ca.jacobian(body.opening(q, w), q) @ body.tangent(q)
+    both = ca.Function("bent", [q, w], [ca.densify(turning), ca.densify(body.bars(q))])
+    bending, bars = (
+        part.full().reshape(held, len(position), n).transpose(1, 0, 2) for part in both(position.T, velocity.T)
+    )
+    basis, root = link_bases(dynamics, position), inertia_root(dynamics, position[0])
+    inertia = root @ root.T
+    light = np.linalg.solve(inertia, bars.transpose(0, 2, 1))
+    across = -light @ np.linalg.solve(bars @ light, bending @ basis)
+    back = basis.transpose(0, 2, 1) @ inertia
+    bent = across.transpose(0, 2, 1) @ inertia @ across
+    stiff = back @ (flow[:, n:, :n] @ basis + flow[:, n:, n:] @ across) + bent
+    damped = back @ flow[:, n:, n:] @ basis
+    none, one = np.zeros_like(stiff), np.broadcast_to(np.eye(n - held), stiff.shape)
+    return np.concatenate([np.concatenate([none, one], 2), np.concatenate([stiff, damped], 2)], 1)

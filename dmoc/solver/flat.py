@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dmoc.guess.open_ends import end_estimates, velocity_change_between
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
@@ -14,8 +15,10 @@ from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
 from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
-# There is thrust to spare if the path of least effort needs less than this part of the largest thrust [-]:
-# where it needs more, least fuel has burns at places that cost decides on.
+# There is thrust to spare if the change of velocity takes less than this part of the duration at the largest
+# thrust, and the path of least effort no more than this part of that thrust [-]: where it takes more, least
+# fuel has burns at places that cost decides on. Twelve random transfers between circles took 0.03 to 0.11,
+# `leo_raise` all.
 TO_SPARE = 0.3
 # Least effort takes this many iterations at most: of twelve transfers eleven took 22 to 73.
 MOST_EFFORT = 100
@@ -58,11 +61,12 @@ def flat_optimum(ladder: Ladder, first: DiscretePath) -> Rung | None:
 
 def _may_be_flat(problem: TransferProblem) -> bool:
     """Whether a fixed time is to be spent on the way between orbits, one of which leaves its place open."""
+    limit, duration = problem.actuator.force_limit(), problem.duration_bounds[0]
     open_place = not (problem.start.anchored and problem.goal.anchored)
-    return (
-        problem.attraction.lone is not None
-        and open_place
-        and not problem.free_duration
-        and not problem.constraints
-        and has_linear_controls(problem)
-    )
+    between_orbits = problem.attraction.lone is not None and open_place and not problem.free_duration
+    if not between_orbits or limit is None or problem.constraints or not has_linear_controls(problem):
+        return False
+    ends = end_estimates(problem, duration)
+    if not np.isfinite(ends).all():
+        return False
+    return problem.mass * velocity_change_between(problem, ends) < TO_SPARE * limit * duration

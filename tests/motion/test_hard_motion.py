@@ -10,9 +10,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from dmoc import PointGravity, Spring, State, TransferProblem, simulate, solve, three_body, verify
+from dmoc import (
+    PointGravity,
+    RotatingFrame,
+    Spring,
+    State,
+    TransferProblem,
+    simulate,
+    solve,
+    three_body,
+    verify,
+)
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.stability import _exponential
 from dmoc.solver.ladder import Ladder
 
 # h omega at which each order first loses stability
@@ -193,3 +204,19 @@ def test_a_long_mesh_costs_no_digits(steps):
     expected = (coarse.objective / true - 1) * (3200 / steps) ** 2
     assert fine.success and verify(fine).ok
     assert fine.objective / true - 1 == pytest.approx(expected, rel=0.02, abs=1e-10)
+
+
+def test_a_drift_in_a_turning_frame_is_stable_though_its_eigenvalues_are_double():
+    """They are split by the root of a step's error: one exceeds 1 by 0.0017, which 20 steps do not feel."""
+    ends = State((-0.792, 0.36), (0.07, 0.0027)), State((-0.767, 2.2), (1.025, 1.255))
+    drift = TransferProblem(1.4, *ends, 2.83, effects=[RotatingFrame(0.76)])
+    answer = solve(drift, order=2, steps=20, hold=True)
+    check = verify(answer)["stability"]
+    assert verify(answer).ok
+    assert check.value == pytest.approx(1.0, abs=1e-3) and check.value**20 < 2
+
+
+def test_the_exponential_of_a_matrix_with_too_few_eigenvectors():
+    jordan = np.array([[2.0, 1.0], [0.0, 2.0]])
+    assert _exponential(jordan) == pytest.approx(np.exp(2) * np.array([[1, 1], [0, 1]]), rel=1e-12)
+    assert _exponential(-40 * jordan) == pytest.approx(np.exp(-80) * np.array([[1, -40], [0, 1]]), rel=1e-9)

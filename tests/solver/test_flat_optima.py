@@ -8,6 +8,7 @@ import pytest
 
 from dmoc import (
     BallForce,
+    CircularOrbit,
     Engine,
     FinalMass,
     Fuel,
@@ -25,6 +26,10 @@ from dmoc import (
 )
 from dmoc.motion.dynamics import Dynamics
 from dmoc.results.flown_cost import unpriced
+from dmoc.solver.flat import flat_optimum
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.meshes import trial_path
+from dmoc.solver.rung import OFF_OPTIMUM
 
 CROSS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 # from place to place in a frame that turns; duality proves that the least fuel is 0.8653420757 N s
@@ -163,3 +168,36 @@ def test_a_target_that_moves_is_met_sooner_where_the_longest_time_leads_nowhere(
     chase = TransferProblem(1.0, State((0, 0), (0, 0)), target, (1.0, 3.6), actuator=BallForce(1.6))
     solution = solve(chase, order=6)
     assert solution.success, solution.message
+
+
+# Between circles with thrust to spare, anywhere on the second: Hohmann's two impulses burn no less than
+# 0.02701 kg.
+CIRCLES = TransferProblem(
+    1.0,
+    State((-0.17240217175596456, 0.9850266449055207), (-0.9850266449055207, -0.17240217175596456)),
+    CircularOrbit(1.2118842475446392, 1.0),
+    10.02916079230658,
+    effects=[PointGravity(1.0)],
+    actuator=Engine(0.28774196224086646, exhaust_velocity=3.30592923439145),
+    objective=Fuel(),
+)
+
+
+def test_with_thrust_to_spare_least_fuel_begins_near_least_effort():
+    ladder = Ladder(CIRCLES)
+    with ladder.interrupt:
+        rung = flat_optimum(ladder, trial_path(CIRCLES, 4, None, False))
+    assert rung is not None and rung.solved and rung.pull <= OFF_OPTIMUM
+    # On 28 steps; 0.0272713 on 843.
+    assert rung.level.objective == pytest.approx(0.0272606, rel=1e-5)
+    assert ladder.rungs[0].level.question == "least effort"
+    held = [one for one in ladder.rungs[1:5] if one.level.iterations <= 10]
+    assert len(held) == 4
+
+
+def test_with_little_thrust_to_spare_least_fuel_is_sought_as_ever():
+    hurried = replace(CIRCLES, actuator=Engine(0.03, exhaust_velocity=3.3))
+    ladder = Ladder(hurried)
+    assert flat_optimum(ladder, trial_path(hurried, 4, None, False)) is None
+    assert ladder.rungs == ()
+    assert flat_optimum(Ladder(TURNING), trial_path(TURNING, 4, None, False)) is None
