@@ -1,4 +1,4 @@
-"""Falls past the smaller of two attractors: the guess is of least effort, on a mesh that follows it."""
+"""Falls past the smaller of two attractors: the guess is the path of least effort, on a mesh to match."""
 
 import numpy as np
 import pytest

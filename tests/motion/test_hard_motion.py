@@ -207,7 +207,7 @@ def test_a_long_mesh_costs_no_digits(steps):
 
 
 def test_a_drift_in_a_turning_frame_is_stable_though_its_eigenvalues_are_double():
-    """They are split by the root of a step's error: one exceeds 1 by 0.0017, which 20 steps do not feel."""
+    """They are split by the root of the error of a step: one exceeds 1 by 0.0017, no matter for 20 steps."""
     ends = State((-0.792, 0.36), (0.07, 0.0027)), State((-0.767, 2.2), (1.025, 1.255))
     drift = TransferProblem(1.4, *ends, 2.83, effects=[RotatingFrame(0.76)])
     answer = solve(drift, order=2, steps=20, hold=True)

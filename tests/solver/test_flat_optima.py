@@ -170,8 +170,7 @@ def test_a_target_that_moves_is_met_sooner_where_the_longest_time_leads_nowhere(
     assert solution.success, solution.message
 
 
-# Between circles with thrust to spare, anywhere on the second: Hohmann's two impulses burn no less than
-# 0.02701 kg.
+# Between circles with thrust to spare, anywhere on the second: Hohmann's two impulses burn 0.02701 kg.
 CIRCLES = TransferProblem(
     1.0,
     State((-0.17240217175596456, 0.9850266449055207), (-0.9850266449055207, -0.17240217175596456)),
