@@ -135,7 +135,11 @@ def cause_of(
     joint = transfer.relaxed(*limits, least=LEAST)
     found = joint(transfer.problem, transfer.guess)
     if not found.feasible:
-        return _unlimited(transfer) or _one_alone(transfer, limits) or _rows(transfer)
+        if (free := _unlimited(transfer)) is not None:
+            return free
+        rows = _rows(transfer)
+        # A path on which every row can be met is worth more than a limit that would be enough.
+        return rows if rows.path is not None else _one_alone(transfer, limits) or rows
     if transfer.leaps(found.path):
         return _zones(transfer) or _rows(transfer)
     if found.slack[0] <= MET:
@@ -196,8 +200,11 @@ def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
 
 
 def _one_alone(transfer: Relaxable, limits: list[Giving]) -> Cause | None:
-    """One limit that is enough where all together were not found to be: each has its own scale."""
-    if len(limits) == 1:
+    """One limit that is enough where all together were not found to be: each has its own scale.
+
+    What wheels store has one that no other limit has. Elsewhere a finer mesh is worth more than a single limit.
+    """
+    if len(limits) == 1 or not any(part.unit == "N m s" for part in transfer.problem.constraints):
         return None
     for limit in limits:
         alone = transfer.relaxed(limit)(transfer.problem, transfer.guess)

@@ -53,6 +53,9 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePat
     cost = np.concatenate([parts.objective(x, p).full().ravel(), slopes.full().ravel()])
     if rows.all() and np.isfinite(cost).all():
         return
+    # The NLP counts from its own origin: a place next to an attractor may come to lie on it by rounding.
+    origin = nlp.units.origin
+    refuse_undefined_motion(nlp.dynamics, problem, replace(guess, position=guess.position - origin + origin))
     objective = f"the objective {type(problem.objective).__name__}"
     name = objective if rows.all() else nlp.rows.name_of(int(np.argmin(rows)))
     raise ValueError(f"{name} or its derivative is not a finite number at the guess; {REMEDY}")

@@ -258,6 +258,7 @@ def test_turning_space_turns_the_answer():
     assert np.abs(other.torque - first.torque).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_needed_torque_and_time_are_named():
     hard = turn(150, (0, 0, 1), 2.0, actuator=Torque(0.75))
     failed = solve(hard)

@@ -127,6 +127,7 @@ def test_coarse_meshes_follow_the_revolutions():
     assert len(meshes) > 1 and len(meshes[0]) - 1 >= 9.9 * 100
 
 
+@pytest.mark.slow
 def test_numbers_that_a_goal_fixes_are_not_lost():
     """Shots know the conditions of a goal alone."""
     start = State((1, 0), (0, 1))

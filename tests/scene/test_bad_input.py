@@ -29,16 +29,24 @@ from dmoc import (
     Effect,
     Effort,
     FreeForce,
+    Holonomic,
+    JointTorque,
     KeepOut,
     LinearDrag,
+    Member,
+    MomentumLimit,
     Objective,
+    On,
     PlateRadiation,
     Plates,
     PointGravity,
     Pose,
     RadiationPressure,
+    Rod,
+    Several,
     Shadow,
     State,
+    System,
     ThirdBody,
     Time,
     Torque,
@@ -100,9 +108,12 @@ MAKES = {
     "FinalRadius": {"center": (0, 0)},
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
+    "JointTorque": {"rod": Rod((0, 1), 1.0), "limit": 2.0, "against": None},
     "KeepIn": {"lower": (-9, -9), "upper": (9, 9), "point": None},
     "KeepOut": {"center": (2, 2), "radius": 0.5, "point": None},
     "LinearDrag": {"coefficient": 0.1, "wind": None},
+    "Member": {"name": "a", "mass": 1.0, "inertia": None},
+    "MomentumLimit": {"limit": (1.0, 1.0, 1.0)},
     "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched", "attitude": None, "rate": "matched"},
     "Nozzles": {
         "directions": ((1, 0), (-1, 0), (0, 1), (0, -1)),
@@ -117,11 +128,14 @@ MAKES = {
     "Plates": {"areas": (1.0,), "normals": ((1, 0, 0),), "offsets": ((0, 1, 0),)},
     "PointGravity": {"mu": 1.0, "center": (0, 9)},
     "PointingKeepIn": {"axis": (1, 0, 0), "direction": (1, 0, 0), "angle": 179.0},
+    "On": {"body": "a", "push": FreeForce(), "axes": (0,)},
     "PointingKeepOut": {"axis": (1, 0, 0), "direction": (-1, 0, 0), "angle": 20.0},
     "Pose": {"position": (4, 0, 0), "velocity": (0, 0, 0), "attitude": (1, 0, 0, 0), "rate": (0, 0, 0)},
     "RadiationPressure": {"area": 1.0, "reflectivity": 0.5, "sun": (1.5e11, 0), "shadow": None},
     "RateLimit": {"limit": 9.0},
+    "Rod": {"anchor": (0, 1), "length": 1.0, "on": ""},
     "RotatingFrame": {"rate": 0.1},
+    "Slider": {"point": (0, 0), "direction": (1, 0), "on": ""},
     "SpeedLimit": {"limit": 9.0, "point": None},
     "Spring": {"stiffness": 1.0, "anchor": (0, 0)},
     "State": {"position": (0, 0), "velocity": (0, 0)},
@@ -135,12 +149,22 @@ MAKES = {
         "dry_mass": 0.1,
         "inertia_law": "scaled",
     },
+    "Several": {"parts": (FreeForce(),)},
+    "System": {"bodies": (Member("a", 1.0), Member("b", 1.0)), "links": (Rod("a", 1.0, on="b"),)},
     "Torque": {"limit": 2.0},
+    "Surface": {"function": lambda q: q[1], "on": ""},
     "TransferProblem": scene(
         effects=(), actuator=FreeForce(), objective=Effort(), constraints=(), guess=None, start_time=0.0
     ),
     "UniformAtmosphere": {"density": 1.0, "wind": (0, 1)},
     "UniformGravity": {"acceleration": (0, -1)},
+    "Wheels": {
+        "axes": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        "max_torque": 1.0,
+        "max_momentum": 2.0,
+        "start_momentum": (0, 0, 0),
+        "goal_momentum": None,
+    },
     "WeightedSum": {"parts": ((1.0, Effort()), (2.0, Time()))},
     "Wind": {"field": (0, 1)},
     "Wrench": {"force_limit": 2.0, "torque_limit": 2.0, "frame": "body", "lever": 1.0},
@@ -242,6 +266,12 @@ def put_to_use(part):
     """A problem with this part in it."""
     if isinstance(part, TransferProblem):
         return part
+    if isinstance(part, (Member, System, On, JointTorque, Several, MomentumLimit)):
+        # They mean something in a system, or with their wheels, alone.
+        return None
+    if isinstance(part, Holonomic):
+        ends = State((0, 0), (0, 0)), State((0, 0), (0, 0))
+        return TransferProblem(**scene(start=ends[0], goal=ends[1], links=[part]))
     if isinstance(part, Plates):
         part = PlateRadiation(part, (1, 0, 0))
     if getattr(part, "turns_body", False):
@@ -288,6 +318,7 @@ def test_every_constructor_is_tried():
         "Constraint",
         "Effect",
         "Force",
+        "Holonomic",
         "Objective",
     }
     without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}

@@ -85,6 +85,7 @@ LIMITED = {
 
 
 @pytest.mark.parametrize("name", LIMITED)
+@pytest.mark.slow
 def test_the_limit_that_is_enough(name):
     problem, given, known = LIMITED[name]
     failed = solve(problem(given))
@@ -123,6 +124,7 @@ FAR_OFF = {
 
 
 @pytest.mark.parametrize("name", FAR_OFF)
+@pytest.mark.slow
 def test_a_limit_that_is_off_by_orders_of_magnitude(name):
     problem, given, known = FAR_OFF[name]
     failed = solve(problem(given))
@@ -185,6 +187,7 @@ BRIEF = {
 
 
 @pytest.mark.parametrize("name", BRIEF)
+@pytest.mark.slow
 def test_the_duration_that_is_enough(name):
     problem, given, known = BRIEF[name]
     failed = solve(problem(given))
@@ -198,6 +201,7 @@ def test_the_duration_that_is_enough(name):
     assert not solve(problem(0.97 * needed), steps=100).success
 
 
+@pytest.mark.slow
 def test_the_speed_and_the_radius_that_are_enough():
     def fast(limit):
         return rest_to_rest((10.0, 0.0), 5.0, constraints=[SpeedLimit(limit)])
@@ -237,6 +241,7 @@ def test_the_worst_rows_are_in_units_of_the_problem():
     assert lacking == pytest.approx(4 / 1.9 * 0.5 - 0.5 * 1.9, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_dry_mass_that_leaves_propellant_enough():
     """Two short burns and a coast change the velocity by 2 d / T at least, which takes so much propellant."""
     way, duration, exhaust, mass = 2.0, 4.0, 20.0, 1.7
@@ -256,6 +261,7 @@ def test_the_dry_mass_that_leaves_propellant_enough():
     assert answer.success, answer.message
 
 
+@pytest.mark.slow
 def test_between_two_attractors_the_verdict_is_one_of_the_guess():
     """One that passes on the wrong side of an attractor needs far more than another one would."""
     hurried = TransferProblem(

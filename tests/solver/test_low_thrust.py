@@ -33,6 +33,7 @@ def test_least_effort_keeps_the_limit_and_takes_few_iterations(oblate, any_plane
     assert velocity_change(solution) == pytest.approx(edelbaum(100e3), rel=0.08 if oblate else 0.01)
 
 
+@pytest.mark.slow
 def test_least_fuel_of_a_day_is_less_than_that_of_least_effort():
     solution, effort = (solve(CASE["problem"](days=1.0, climb=50e3, fuel=fuel)) for fuel in (True, False))
     assert verify(solution.raise_for_status())["optimality"].ok
