@@ -176,16 +176,16 @@ def graded_guess(
     problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
-    mesh = uniform_mesh(SAMPLES)
+    sampled = uniform_mesh(SAMPLES)
     for _ in range(GRADED):
-        fine = starting_guess(problem, mesh, 2, hold, given)
+        fine = starting_guess(problem, sampled, 2, hold, given)
         rates = problem.attraction.rates(fine.place)
-        turned = 0.5 * (rates[1:] + rates[:-1]) * np.diff(mesh)
+        turned = 0.5 * (rates[1:] + rates[:-1]) * np.diff(sampled)
         angles = np.append(0.0, np.cumsum(turned))
-        mesh = np.interp(uniform_mesh(SAMPLES), angles / angles[-1], mesh)
-        if turned.max() < EVEN * turned.mean():
+        mesh = np.interp(uniform_mesh(steps), angles / angles[-1], sampled)
+        if turned.max() < EVEN * turned.mean() or problem.attraction.lone is not None:
             break
-    mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), uniform_mesh(SAMPLES), mesh)
+        sampled = np.interp(uniform_mesh(SAMPLES), angles / angles[-1], sampled)
     return starting_guess(problem, mesh, order, hold, given)
 
 
@@ -217,10 +217,16 @@ def coarse_to_fine(problem: TransferProblem, first: DiscretePath) -> tuple[int, 
 
 
 def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
-    """Steps that keep h omega below 1 along a path, omega the fastest rate of the linearised motion."""
-    count = min(100, len(path.mesh) - 1)
-    places = np.linspace(0.0, 1.0, len(path.mesh))
-    sample = path.onto(np.interp(uniform_mesh(count), places, path.mesh), 2, path.hold)
+    """Steps that keep h omega below 1 along a path, omega the fastest rate of the linearised motion.
+
+    They are equal ones, more than enough if they will be short where the motion is fast; past one of several
+    attractors, where that would be far more, they are those of the mesh of the path.
+    """
+    mesh = uniform_mesh(min(100, len(path.mesh) - 1))
+    falls = problem.attraction.lone is None and is_uneven(problem, path)
+    if falls:
+        mesh = np.interp(mesh, np.linspace(0.0, 1.0, len(path.mesh)), path.mesh)
+    sample = path.onto(mesh, 2, path.hold)
     slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
     dynamics = Dynamics.of(problem)
     flow, _ = flow_matrices(
@@ -229,10 +235,10 @@ def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
     rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
     # A mode that dies out need not be followed.
     fastest = np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
-    # On a graded mesh steps are short where the motion is fast.
-    h = count * np.diff(sample.mesh)
-    swept = (np.maximum(np.append(h, 0.0), np.append(0.0, h)) * fastest).max()
-    return int(np.clip(path.duration * swept, 2, MOST_COARSE))
+    if falls:
+        h = (len(mesh) - 1) * np.diff(mesh)
+        fastest = fastest * np.maximum(np.append(h, 0.0), np.append(0.0, h))
+    return int(np.clip(path.duration * fastest.max(), 2, MOST_COARSE))
 
 
 def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:
