@@ -133,13 +133,19 @@ class On(Actuator):
     adjustable: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        of_kind("On: body", self.body, str)
         of_kind("On: push", self.push, Actuator)
         if self.push.burns or self.push.throttle(ca.SX.sym("u", 8)) is not None:
             raise ValueError(
                 f"On: {type(self.push).__name__} burns propellant; bodies of a system keep their masses"
             )
         if self.axes is not None:
-            checked(self, axes=tuple(int(axis) for axis in entries(self.axes) or ()))
+            given = entries(self.axes)
+            if not given or not all(type(axis) is int and axis in (0, 1, 2) for axis in given):
+                raise ValueError(
+                    f"On: axes must list some of 0, 1, 2, which are x, y, z; got {short(self.axes)}"
+                )
+            checked(self, axes=given)
 
     @property
     def structure(self) -> tuple:
