@@ -41,7 +41,7 @@ def test_what_was_red_is_mended(case, numerics, right):
 
 
 def test_a_slow_eccentric_transfer_needs_no_mending():
-    """It was red on its first mesh, and mended to 0.0439508; from steps that follow it, a cheaper one is found."""
+    """It was red on its first mesh, and mended to 0.0439508; steps that follow it find a cheaper one."""
     found = solve(load_problem(str(CASES / "eccentric_slow.py")).make(), order=8)
     assert found.success and verify(found).ok
     assert found.objective == pytest.approx(0.0164394, rel=1e-4)
