@@ -300,6 +300,7 @@ EVERY = [name if name in SHORT else pytest.param(name, marks=pytest.mark.slow) f
 
 
 @pytest.mark.parametrize("name", EVERY)
+@pytest.mark.slow
 def test_what_a_message_names_is_enough_and_a_tenth_less_is_not(name):
     make, given, how, remedies = SCENES[name]
     failed = solve(make(*given), **how)
