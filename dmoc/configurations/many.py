@@ -56,10 +56,9 @@ class Many(Configuration):
     def dimension(self) -> int:
         return self.parts[0].dimension
 
-    def cut(self, column: Any, of_velocities: bool = False) -> list[Any]:
+    def cut(self, column: Any) -> list[Any]:
         """The entries of a column that belong to each body."""
-        sizes = [part.freedom if of_velocities else part.size for part in self.parts]
-        return ca.vertsplit(ca.SX(column), list(accumulate(sizes, initial=0)))
+        return ca.vertsplit(ca.SX(column), list(accumulate((part.size for part in self.parts), initial=0)))
 
     def _each(self, q: Any, v: Any, m: Any) -> list[tuple[float, Configuration, Any, Any, Any]]:
         """Share, configuration, coordinates, their rates and mass of each body."""
@@ -114,7 +113,7 @@ class Many(Configuration):
         return [(name, part.body(qs, vs), ms) for name, (_, part, qs, vs, ms) in named]
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
-        raise NotImplementedError("a force acts on one of several bodies")
+        raise TypeError("a force acts on one of several bodies: `on`")
 
     def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
         places = zip(self.bodies, self.parts, self.cut(q), strict=True)

@@ -47,6 +47,11 @@ class JointTorque(Actuator):
     def structure(self) -> tuple:
         return type(self), self.rod, self.against, self.limit is None
 
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        rods = [self.rod] if self.against is None else [self.rod, self.against]
+        return tuple(name for rod in rods for name in rod.holds)
+
     def check_dimension(self, dimension: int) -> None:
         if dimension != 2:
             raise ValueError(
@@ -146,6 +151,13 @@ class On(Actuator):
                     f"On: axes must list some of 0, 1, 2, which are x, y, z; got {short(self.axes)}"
                 )
             checked(self, axes=given)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.body,)
+
+    def metered(self, dimension: int) -> Actuator:
+        raise ValueError("least fuel is for a single body so far; minimise Effort() or Time()")
 
     @property
     def structure(self) -> tuple:

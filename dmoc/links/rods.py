@@ -35,6 +35,8 @@ class Rod(Holonomic):
     def __post_init__(self) -> None:
         if not isinstance(self.anchor, str):
             checked(self, anchor=vector("Rod: anchor", self.anchor, "m"))
+        elif self.anchor == self.on:
+            raise ValueError(f"Rod: it joins {self.on!r} to itself; give another body or a point as its anchor")
         checked(self, length=number("Rod: length", self.length, "m", positive=True))
 
     def check_dimension(self, dimension: int) -> None:

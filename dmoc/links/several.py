@@ -43,6 +43,9 @@ class Several(Actuator):
         units = dict.fromkeys(part.effort_unit for part in self.parts)
         return " + ".join(units)
 
+    def metered(self, dimension: int) -> Actuator:
+        raise ValueError("least fuel is for a single actuator so far; minimise Effort() or Time()")
+
     def check_dimension(self, dimension: int) -> None:
         for part in self.parts:
             part.check_dimension(dimension)
@@ -56,27 +59,24 @@ class Several(Actuator):
     def units(self, dimension: int) -> tuple[str, ...]:
         return tuple(unit for part in self.parts for unit in part.units(dimension))
 
-    def _cut(self, u: Any, dimension: int) -> list[Any]:
-        ends = list(accumulate((part.size(dimension) for part in self.parts), initial=0))
-        return [u[first:last] for first, last in pairwise(ends)]
+    def _places(self, dimension: int) -> list[slice]:
+        """Where the controls of each part stand."""
+        ends = accumulate((part.size(dimension) for part in self.parts), initial=0)
+        return [slice(first, last) for first, last in pairwise(ends)]
 
     def _known(self, u: Any) -> list[tuple[Actuator, Any]]:
         """The parts and their controls, where the number of axes is told by the number of controls."""
         count = u.shape[-1] if isinstance(u, np.ndarray) else u.numel()
         axes = next(axes for axes in (2, 3, 1) if self.size(axes) == count)
-        ends = list(accumulate((part.size(axes) for part in self.parts), initial=0))
-        cuts = [slice(first, last) for first, last in pairwise(ends)]
-        columns = [u[:, cut] if isinstance(u, np.ndarray) else u[cut] for cut in cuts]
+        columns = [u[:, at] if isinstance(u, np.ndarray) else u[at] for at in self._places(axes)]
         return list(zip(self.parts, columns, strict=True))
 
     def effort(self, u: Any) -> Any:
         return sum(part.effort(mine) for part, mine in self._known(u))
 
     def acts(self, configuration: Any, q: Any, u: Any) -> Any:
-        return sum(
-            part.acts(configuration, q, mine)
-            for part, mine in zip(self.parts, self._cut(u, configuration.dimension), strict=True)
-        )
+        places = zip(self.parts, self._places(configuration.dimension), strict=True)
+        return sum(part.acts(configuration, q, u[at]) for part, at in places)
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         sides = [part.bounds(dimension) for part in self.parts]

@@ -107,6 +107,11 @@ class Actuator(ABC):
         return self.force(u), None
 
     @property
+    def bodies(self) -> tuple[str, ...] | None:
+        """The names of the bodies on which it acts; None where it acts on the only one."""
+        return None
+
+    @property
     def wheel_axes(self) -> tuple[tuple[float, ...], ...]:
         """The axes of the reaction wheels that it turns, unit vectors in body axes; none by default."""
         return ()

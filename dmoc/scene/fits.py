@@ -12,15 +12,7 @@ from dmoc.basics.quaternions import AXES, QUATERNION, rotation_of
 from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
-from dmoc.ends.each import each_of
-from dmoc.links.several import Several
-from dmoc.links.system import System
-from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
-
-# A boundary state may be off a link by this part of its position, and leave it at this part of its speed [-]:
-# numbers that were written with ten digits are taken as meant.
-END_GAP = 1e-8
 
 
 def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
@@ -171,97 +163,3 @@ def check_functions(problem: Any) -> None:
 def _is_users(part: Any) -> bool:
     """Whether the class of a part is defined outside dmoc, where no test of dmoc has looked at it."""
     return not type(part).__module__.startswith("dmoc.")
-
-
-def check_links(problem: Any) -> None:
-    """Links must be there at both ends, hold each by itself, and leave the body a way to move.
-
-    Raises
-    ------
-    ValueError
-        If an end breaks a link or has a velocity that would, or if links are redundant there.
-    """
-    if not problem.links:
-        return
-    if problem.inertia is not None:
-        raise ValueError("links hold bodies without an attitude so far; leave out the inertia, or the links")
-    n = len(problem.start.fixed()[0])
-    q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
-    names = problem.system.names if problem.system is not None else ("",)
-    places = dict(zip(names, ca.vertsplit(q, problem.dimension), strict=True))
-    at = {name: Body(place, place) for name, place in places.items()}
-    rows = []
-    for i, link in enumerate(problem.links):
-        words = f"{type(link).__name__}.g (link {i + 1})"
-        g = evaluated(words, lambda _, link=link: link.g_of(at), [q], "write it with casadi's functions")
-        if not ca.depends_on(ca.SX(g), q):
-            raise ValueError(f"{words} does not depend on the position; it must be zero where the link holds")
-        rows.append(ca.vec(ca.SX(g)))
-    for name in ("start", "goal"):
-        position, velocity = getattr(problem, name).fixed()
-        for i, (link, g) in enumerate(zip(problem.links, rows, strict=True)):
-            _check_end(
-                f"{name} breaks {type(link).__name__} (link {i + 1})", link, (q, v, g), position, velocity
-            )
-        if not np.isnan(position).any():
-            _check_rank(
-                problem, name, ca.Function("slopes", [q], [ca.jacobian(ca.vertcat(*rows), q)])(position)
-            )
-
-
-def _check_end(words: str, link: Any, symbols: tuple, position: np.ndarray, velocity: np.ndarray) -> None:
-    q, v, g = symbols
-    # NaN marks what is free: what depends on it is not known.
-    state = np.nan_to_num(position), np.nan_to_num(velocity)
-    looks = [i for i in range(len(position)) if ca.depends_on(g, q[i])]
-    if np.isnan(position[looks]).any():
-        return
-    size = max(float(np.abs(position[looks]).max(initial=0.0)), 1e-300)
-    gap = float(ca.norm_inf(ca.Function("gap", [q], [ca.densify(g)])(state[0])))
-    if gap > END_GAP * max(size, 1.0 if link.unit != "m" else size):
-        unit = link.unit if link.unit != "-" else ""
-        raise ValueError(f"{words} by {gap:.3g} {unit}".rstrip() + "; move the end or the link")
-    opening = ca.jtimes(g, q, v)
-    moves = [i for i in range(len(velocity)) if ca.depends_on(opening, v[i])]
-    if np.isnan(velocity[moves]).any():
-        return
-    rate = float(ca.norm_inf(ca.Function("rate", [q, v], [ca.densify(opening)])(*state)))
-    speed = float(np.linalg.norm(np.nan_to_num(velocity)))
-    if rate > END_GAP * max(speed, 1e-300):
-        unit = "m/s" if link.unit == "m" else "1/s"
-        raise ValueError(f"{words}: its velocity leaves it at {rate:.3g} {unit}; turn the velocity along it")
-
-
-def of_system(problem: Any) -> dict[str, Any]:
-    """What a problem of several bodies is made of: masses, links and ends from the system."""
-    system = problem.mass if isinstance(problem.mass, System) else problem.system
-    actuator = problem.actuator
-    several = entries(actuator)
-    if several is not None and not isinstance(actuator, Actuator):
-        actuator = Several(several)
-    if system is None:
-        return {"actuator": actuator}
-    if problem.inertia is not None:
-        raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
-    if problem.constraints:
-        raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
-    ends = {name: each_of(name, getattr(problem, name), system.names) for name in ("start", "goal")}
-    more = tuple(link for link in problem.links if link not in system.links)
-    return {
-        "system": system,
-        "mass": system.mass,
-        "links": (*system.links, *more),
-        "actuator": actuator,
-        **ends,
-    }
-
-
-def _check_rank(problem: Any, name: str, slopes: Any) -> None:
-    """Each link must hold in a way that the others do not."""
-    matrix = np.array(ca.DM(slopes))
-    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
-    if np.linalg.matrix_rank(matrix, tol=1e-9) < len(matrix):
-        names = ", ".join(f"{type(link).__name__} (link {i + 1})" for i, link in enumerate(problem.links))
-        raise ValueError(f"at the {name} the links hold the same motion twice: {names}; leave one of them out")
-    if len(matrix) >= matrix.shape[1]:
-        raise ValueError(f"at the {name} {len(matrix)} equations of links leave the body no way to move")

@@ -20,7 +20,8 @@ from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
-from dmoc.scene.fits import check_acts_on, check_functions, check_links, of_system, turning_checked
+from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
+from dmoc.scene.systems import check_links, check_pushed, of_system
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -124,6 +125,7 @@ class TransferProblem:
         check_functions(self)
         self._check_objective()
         self._check_ends()
+        check_pushed(self)
         check_links(self)
         if self.actuator.dry_mass >= self.mass:
             raise ValueError(

@@ -1,6 +1,6 @@
 """Rods, rails and surfaces: closed forms, orders, long runs, forces of links, messages."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from dmoc import (
     BallForce,
     BoxForce,
-    Effort,
+    FinalHeight,
     FreeForce,
+    Fuel,
     Holonomic,
     JointTorque,
     KeepOut,
@@ -343,6 +344,15 @@ BAD = {
     "an end of a stranger": (lambda: arm(goal={"hand": State((0, 0), (0, 0))}), "names 'hand'"),
     "no dictionary": (lambda: arm(goal=State((0, 0), (0, 0))), "must be a dictionary"),
     "a zone for a system": (lambda: arm(constraints=[KeepOut((1, 1), 0.1)]), "single body"),
+    "a push on no body": (lambda: cart_pole(actuator=BoxForce(1.0)), "does not say which of the bodies"),
+    "no actuator": (lambda: cart_pole(actuator=FreeForce()), "does not say which of the bodies"),
+    "a push on a stranger": (lambda: cart_pole(actuator=On("cat", BoxForce(1.0))), "acts on 'cat'"),
+    "a motor of strangers": (lambda: cart_pole(actuator=JointTorque(Rod("x", 1.0, on="y"))), "acts on 'x'"),
+    "a name for an only body": (lambda: pendulum(links=[Rod((0, 0), 1.0, on="bob")]), "holds 'bob'"),
+    "a place of several": (lambda: cart_pole(objective=FinalHeight()), "looks at the place of one body"),
+    "least fuel": (lambda: cart_pole(objective=Fuel()), "least fuel is for a single body"),
+    "another mass": (lambda: replace(cart_pole(), mass=3.0), "1.3 kg together"),
+    "a rod to itself": (lambda: System([Member("a", 1.0)], [Rod("a", 1.0, on="a")]), "to itself"),
     "links and an inertia": (lambda: pendulum(inertia=(1, 1, 1)), "attitude"),
 }
 
@@ -371,9 +381,7 @@ def test_files_hold_systems_and_answers_start_others(tmp_path):
 
 
 def test_a_scene_without_links_has_nothing_of_them():
-    free = TransferProblem(
-        1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0, actuator=FreeForce(), objective=Effort()
-    )
+    free = TransferProblem(1.0, State((0, 0), (0, 0)), State((1, 0), (0, 0)), 1.0)
     found = solve(free, steps=10)
     assert found.reaction is None and found.path.reaction is None
     assert [check.name for check in verify(found).checks].count("constraint") == 0
