@@ -176,16 +176,17 @@ def graded_guess(
     problem: TransferProblem, steps: int, order: int, hold: bool, given: Any = None
 ) -> DiscretePath:
     """A guess whose steps turn by equal angles around attractors: h ~ r^1.5."""
-    sampled = uniform_mesh(SAMPLES)
+    sampled, density = uniform_mesh(SAMPLES), np.full(SAMPLES, float(SAMPLES))
     for _ in range(GRADED):
         fine = starting_guess(problem, sampled, 2, hold, given)
         rates = problem.attraction.rates(fine.place)
-        turned = 0.5 * (rates[1:] + rates[:-1]) * np.diff(sampled)
+        turned = (rates[1:] + rates[:-1]) / density
         angles = np.append(0.0, np.cumsum(turned))
-        mesh = np.interp(uniform_mesh(steps), angles / angles[-1], sampled)
+        mesh = np.interp(np.linspace(0.0, 1.0, steps + 1), angles / angles[-1], fine.fractions)
         if turned.max() < EVEN * turned.mean() or problem.attraction.lone is not None:
             break
         sampled = np.interp(uniform_mesh(SAMPLES), angles / angles[-1], sampled)
+        density = 1 / np.diff(sampled)
     return starting_guess(problem, mesh, order, hold, given)
 
 
