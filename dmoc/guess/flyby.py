@@ -24,7 +24,7 @@ NEARLY_LINEAR = 0.2
 SHORTER = 0.3
 # A search ends after this many shots, or with steps of less than this part of the way: of 48 random transfers
 # most took 4, and 12 at most.
-MOST_SHOTS, SHORTEST = 40, 1e-4
+MOST_SHOTS, SHORTEST = 15, 1e-4
 # The effort is the sum over this many places.
 PLACES = 2001
 

@@ -128,7 +128,7 @@ def _past_attractors(
     attraction, ends = problem.attraction, (problem.start, problem.goal)
     times = problem.start_time, problem.start_time + duration
     states = tuple(end.estimate(at) for end, at in zip(ends, times, strict=True))
-    several = bool(attraction.sources) and attraction.lone is None and problem.dimension > 1
+    several = len(attraction.sources) > 1 and problem.dimension > 1
     if not several or problem.free_duration or np.isnan(states).any():
         return None
     path = least_effort_past(problem, duration, states)

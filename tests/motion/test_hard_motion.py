@@ -123,7 +123,6 @@ FLYBY = 2.876282697e-6
 
 
 @pytest.mark.parametrize(("order", "steps", "error"), [(8, 100, 1e-7), (4, 400, 2e-5), (2, 1600, 0.02)])
-@pytest.mark.slow
 def test_a_flyby_is_right_on_a_graded_mesh(order, steps, error):
     found = solve(flyby(), order=order, mesh=graded(steps))
     assert found.success and verify(found).ok
@@ -132,7 +131,6 @@ def test_a_flyby_is_right_on_a_graded_mesh(order, steps, error):
 
 
 @pytest.mark.parametrize(("order", "steps", "error"), [(None, None, 3e-3), (2, 1600, 0.02), (8, 32, 1e-4)])
-@pytest.mark.slow
 def test_steps_are_graded_where_the_guess_passes_near_an_attractor(order, steps, error):
     found = solve(flyby(), order=order, steps=steps)
     assert found.success and verify(found).ok

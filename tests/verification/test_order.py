@@ -199,7 +199,6 @@ HELD = [(scene, order) for scene in TRANSFERS for order in (ORDERS if scene == "
 
 
 @pytest.mark.parametrize("scene, order", HELD)
-@pytest.mark.slow
 def test_optimal_transfer_with_held_forces_is_of_second_order_whatever_the_scheme(scene, order):
     fine = transfer(scene, 8, REFERENCE_STEPS)
     reference, meshes = at_step_ends(fine), (576, 1152, 2304) if order == 2 else (240, 480, 960)
