@@ -36,7 +36,9 @@ class Rod(Holonomic):
         if not isinstance(self.anchor, str):
             checked(self, anchor=vector("Rod: anchor", self.anchor, "m"))
         elif self.anchor == self.on:
-            raise ValueError(f"Rod: it joins {self.on!r} to itself; give another body or a point as its anchor")
+            raise ValueError(
+                f"Rod: it joins {short(self.on)} to itself; give another body or a point as its anchor"
+            )
         checked(self, length=number("Rod: length", self.length, "m", positive=True))
 
     def check_dimension(self, dimension: int) -> None:

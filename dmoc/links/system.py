@@ -9,6 +9,9 @@ from typing import Any
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
 from dmoc.links.holonomic import Holonomic
 
+# Names of bodies are listed in messages and written beside curves.
+LONGEST_NAME = 40
+
 
 @dataclass(frozen=True)
 class Member:
@@ -27,8 +30,11 @@ class Member:
     inertia: Any = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name.isidentifier():
-            raise ValueError(f"Member: name must be a word of letters, digits and _; got {short(self.name)}")
+        if not isinstance(self.name, str) or not self.name.isidentifier() or len(self.name) > LONGEST_NAME:
+            raise ValueError(
+                f"Member: name must be a word of letters, digits and _, at most {LONGEST_NAME} of them; "
+                f"got {short(self.name)}"
+            )
         checked(self, mass=number(f"Member: mass of {self.name}", self.mass, "kg", positive=True))
         if self.inertia is not None:
             raise ValueError("Member: bodies of a system are point masses so far; leave out the inertia")
@@ -62,7 +68,7 @@ class System:
             for name in link.holds:
                 if name not in names:
                     raise ValueError(
-                        f"System: {type(link).__name__} (link {i + 1}) holds {name!r}; the bodies are "
+                        f"System: {type(link).__name__} (link {i + 1}) holds {short(name)}; the bodies are "
                         f"{', '.join(names)}"
                     )
         checked(self, bodies=tuple(bodies), links=tuple(links))

@@ -101,4 +101,4 @@ def draw_speeds(axes: Any, solution: Solution, late: float) -> None:
     for i, (body, speed) in enumerate(speeds.items()):
         axes.plot(solution.end_times / late, speed / size, label=body or "|v|", **_look(i))
     axes.set_ylabel(f"speed [{unit}]")
-    axes.set_title("Speed of each body")
+    axes.set_title("Speed of each body" if len(speeds) > 1 else "Speed")

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries
+from dmoc.basics.arguments import entries, short
 from dmoc.effects.base import Body
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.each import each_of
@@ -34,7 +34,7 @@ def of_system(problem: Any) -> dict[str, Any]:
     if problem.mass is not system and problem.mass != system.mass:
         raise ValueError(
             f"the bodies of the system have {system.mass:g} kg together; change their masses, "
-            f"not that of the problem to {problem.mass!r} kg"
+            f"not that of the problem to {short(problem.mass)} kg"
         )
     if problem.inertia is not None:
         raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
@@ -70,7 +70,7 @@ def check_pushed(problem: Any) -> None:
         for name in pushed or ():
             if name in names:
                 continue
-            raise ValueError(f"{type(actuator).__name__} acts on {name!r}; {_known(names)}")
+            raise ValueError(f"{type(actuator).__name__} acts on {short(name)}; {_known(names)}")
     if problem.system is None:
         return
     n, m, u = problem.dimension, ca.SX.sym("m"), ca.SX.sym("u", problem.controls)
@@ -108,7 +108,8 @@ def check_links(problem: Any) -> None:
     rows = []
     for i, link in enumerate(problem.links):
         if strangers := [name for name in link.holds if name not in names]:
-            raise ValueError(f"{type(link).__name__} (link {i + 1}) holds {strangers[0]!r}; {_known(names)}")
+            stranger = short(strangers[0])
+            raise ValueError(f"{type(link).__name__} (link {i + 1}) holds {stranger}; {_known(names)}")
         words = f"{type(link).__name__}.g (link {i + 1})"
         g = evaluated(words, lambda _, link=link: link.g_of(at), [q], "write it with casadi's functions")
         if not ca.depends_on(ca.SX(g), q):

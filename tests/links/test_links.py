@@ -341,6 +341,7 @@ BAD = {
     "no direction": (lambda: Slider((0, 0), (0, 0)), "direction"),
     "an unknown body": (lambda: System([Member("a", 1.0)], [Rod("b", 1.0, on="a")]), "holds 'b'"),
     "one name twice": (lambda: System([Member("a", 1.0), Member("a", 1.0)]), "a name of its own"),
+    "a name too long": (lambda: Member(41 * "a", 1.0), "at most 40 of them"),
     "an end of a stranger": (lambda: arm(goal={"hand": State((0, 0), (0, 0))}), "names 'hand'"),
     "no dictionary": (lambda: arm(goal=State((0, 0), (0, 0))), "must be a dictionary"),
     "a zone for a system": (lambda: arm(constraints=[KeepOut((1, 1), 0.1)]), "single body"),
