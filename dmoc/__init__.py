@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from dmoc.ends.base import Boundary as Boundary
     from dmoc.ends.base import State as State
     from dmoc.ends.conditions import Condition as Condition
+    from dmoc.ends.joint_states import JointState as JointState
     from dmoc.ends.moving import Moving as Moving
     from dmoc.ends.orbits import CircularOrbit as CircularOrbit
     from dmoc.ends.orbits import Orbit as Orbit
@@ -70,6 +71,12 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
     from dmoc.links.holonomic import Holonomic as Holonomic
+    from dmoc.links.joint import Joint as Joint
+    from dmoc.links.joints import Fixed as Fixed
+    from dmoc.links.joints import Prismatic as Prismatic
+    from dmoc.links.joints import Revolute as Revolute
+    from dmoc.links.joints import Spherical as Spherical
+    from dmoc.links.push import JointForce as JointForce
     from dmoc.links.push import JointTorque as JointTorque
     from dmoc.links.push import On as On
     from dmoc.links.rods import Rod as Rod

@@ -15,6 +15,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import entries, number, short
+
 # A body that turns does so in a space of this many axes.
 AXES = 3
 # An attitude is a unit quaternion of this many entries.
@@ -22,6 +24,9 @@ QUATERNION = 4
 # Two attitudes nearer to each other than this angle [rad] are joined by a straight line: the sine that slerp
 # divides by is then mere rounding.
 NEARLY_EQUAL = 1e-7
+# A quaternion may be longer or shorter than 1 by this part before it is refused [-]: numbers that were written
+# with four digits are made unit quaternions, others are probably no attitudes.
+NEARLY_UNIT = 1e-3
 
 
 def matrix_of(q: Any) -> Any:
@@ -112,3 +117,26 @@ def in_one_sign(q: np.ndarray) -> np.ndarray:
     """A sequence of attitudes, shape (count, 4), whose neighbours have q_j . q_{j+1} >= 0."""
     flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)
     return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+
+
+def unit_quaternion(value: Any) -> tuple[float, ...]:
+    """A user's attitude as a unit quaternion.
+
+    Raises
+    ------
+    ValueError
+        If it is not four numbers of length 1.
+    """
+    parts = entries(value)
+    if parts is None or len(parts) != QUATERNION:
+        raise ValueError(
+            "an attitude must be a unit quaternion of 4 numbers, scalar first [-], as rotation(axis, degrees) "
+            f"gives, or None; got {short(value)}"
+        )
+    found = np.array([number(f"quaternion[{i}]", part, "-") for i, part in enumerate(parts)])
+    length = float(np.linalg.norm(found))
+    if abs(length - 1) > NEARLY_UNIT:
+        raise ValueError(
+            f"an attitude must be a unit quaternion [-]; got {short(value)} of length {length:.6g}"
+        )
+    return tuple(float(x) for x in found / length)

@@ -44,8 +44,9 @@ def balance(evidence: Evidence) -> tuple[float, float]:
 def _in_space(evidence: Evidence, position: np.ndarray, momenta: np.ndarray) -> np.ndarray:
     """Momenta, one row a place, with the spins turned from body into space axes."""
     found = momenta.copy()
-    for at in evidence.path.coordinates.quaternions:
-        found[:, evidence.rates] = rotated(position[:, at], momenta[:, evidence.rates])
+    made = evidence.path.coordinates
+    for at, rates in zip(made.quaternions, made.turning, strict=True):
+        found[:, rates] = rotated(position[:, at], momenta[:, rates])
     return found
 
 

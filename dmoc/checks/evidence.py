@@ -161,7 +161,10 @@ class Evidence:
         velocity = self.velocity.copy()
         velocity[0], velocity[-1] = self.path.start_velocity, self.path.goal_velocity
         opening = rate(self.position[self.ends].T, velocity.T).full()
-        return np.abs(gap).max(axis=0) / self.extent, np.abs(opening).max(axis=0) / self.speed
+        lengths = np.array([unit == "m" for link in body.link_units for unit in link])[:, None]
+        gaps = np.abs(gap) / np.where(lengths, self.extent, 1.0)
+        openings = np.abs(opening) / np.where(lengths, self.speed, self.rate)
+        return gaps.max(axis=0), openings.max(axis=0)
 
     @cached_property
     def link_turn(self) -> float:
@@ -221,8 +224,7 @@ class Evidence:
     def spin(self) -> float:
         """Largest angular momentum per unit mass at the step ends [m^2/s]; at least of the largest rate."""
         spins = np.linalg.norm(self.momentum[:, self.rates], axis=1)
-        moment = 0.0 if self.problem.inertia is None else float(np.trace(self.problem.inertia)) / 3
-        return max(float(spins.max()), moment * self.rate / float(self.mass[0])) or 1.0
+        return max(float(spins.max()), self.problem.moment * self.rate / float(self.mass[0])) or 1.0
 
     @cached_property
     def torque_scale(self) -> float:

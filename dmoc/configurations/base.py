@@ -95,6 +95,11 @@ class Configuration(ABC):
         """Whether momenta are the velocities of free coordinates: those of one point mass without links."""
         return False
 
+    @property
+    def link_units(self) -> tuple[tuple[str, ...], ...]:
+        """The units of the equations of each link."""
+        return ()
+
     def links_at(self, q: Any) -> Any:
         """The entries of g that belong to links."""
         return ca.SX.zeros(0)
@@ -146,6 +151,10 @@ class Configuration(ABC):
         """dq/dt = Z(q) w; w itself where Z is the identity."""
         return self.tangent(q) @ w if self.surplus else w
 
+    def pieces(self) -> list[tuple[Configuration, Any, Any, float]]:
+        """The configuration of each body, where its coordinates and velocities stand, its share of the mass."""
+        return [(self, slice(0, self.size), slice(0, self.freedom), 1.0)]
+
     @abstractmethod
     def body(self, q: Any, v: Any, m: Any = None) -> Body:
         """The body as effects see it, at a mass where its inertia hangs on it."""
@@ -181,6 +190,10 @@ class Configuration(ABC):
         """R(q), which turns body axes into space axes; None for a body without an attitude."""
         return None
 
+    def accelerations(self, w: Any, force: Any, torque: Any, spun: Any, m: Any) -> Any:
+        """dw/dt of one body under a force [m/s^2], a torque [m^2/s^2] and what acts on wheels [N m]."""
+        raise TypeError(f"{type(self).__name__} is not one body")
+
 
 @dataclass(frozen=True)
 class Translation(Configuration):
@@ -211,4 +224,12 @@ class Translation(Configuration):
         return Body(q, v)
 
     def generalised(self, q: Any, force: Any, torque: Any, spun: Any = None) -> Any:
+        return force
+
+    @property
+    def before(self) -> int:
+        """Number of coordinates before those of a turn, of which it has none."""
+        return self.axes
+
+    def accelerations(self, w: Any, force: Any, torque: Any, spun: Any, m: Any) -> Any:
         return force

@@ -85,6 +85,12 @@ class Coordinates:
         """Where the unit quaternions stand among the coordinates."""
         return [at for block, at in zip(self.blocks, self._slices(), strict=True) if block.kind == ATTITUDE]
 
+    @cached_property
+    def turning(self) -> list[slice]:
+        """Where the rates that belong to the unit quaternions stand among the velocities, in the same order."""
+        ends = np.cumsum([0, *[block.freedom for block in self.blocks]])
+        return [slice(int(ends[i]), int(ends[i + 1])) for i, b in enumerate(self.blocks) if b.kind == ATTITUDE]
+
     @property
     def axes(self) -> int:
         """Number of axes of space; 0 where there is no place."""

@@ -64,10 +64,23 @@ class Linked(Configuration):
     @cached_property
     def _links(self) -> ca.Function:
         """q -> g of the links, and its slope."""
+        q, each = self._equations
+        g = ca.vertcat(*each)
+        return ca.Function("links", [q], [ca.densify(g), ca.jacobian(g, q)])
+
+    @property
+    def _equations(self) -> tuple[ca.SX, list[ca.SX]]:
+        """Coordinates, and g of each link at them."""
         q = ca.SX.sym("q", self.size)
         at = {name: body for name, body, _ in self.free.members(q, ca.SX.zeros(self.size), 1.0)}
-        g = ca.vertcat(*[link.g_of(at) for link in self.links])
-        return ca.Function("links", [q], [ca.densify(g), ca.jacobian(g, q)])
+        return q, [ca.vec(ca.SX(link.g_of(at))) for link in self.links]
+
+    @cached_property
+    def link_units(self) -> tuple[tuple[str, ...], ...]:
+        counts = [g.numel() for g in self._equations[1]]
+        return tuple(
+            link.row_units or (link.unit,) * count for link, count in zip(self.links, counts, strict=True)
+        )
 
     def links_at(self, q: Any) -> Any:
         return self._links(q)[0]
@@ -95,6 +108,9 @@ class Linked(Configuration):
 
     def shared(self, column: Any, m: Any) -> Any:
         return self.free.shared(column, m)
+
+    def pieces(self) -> list[tuple[Configuration, Any, Any, float]]:
+        return self.free.pieces()
 
     def body(self, q: Any, v: Any, m: Any = None) -> Body:
         return self.free.body(q, v, m)

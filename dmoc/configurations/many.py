@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from dmoc.configurations.base import Configuration
-from dmoc.configurations.coordinates import Coordinates
+from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.effects.base import Body
 
 
 @dataclass(frozen=True)
 class Many(Configuration):
-    """Bodies side by side: their coordinates one below the other, and their energies added up.
+    """Bodies side by side: first the places of all, then the attitudes of those that turn; energies add up.
 
     All is per unit of the mass of all bodies: the energy of each counts by its share of that.
 
@@ -36,29 +38,46 @@ class Many(Configuration):
 
     @property
     def names(self) -> tuple[str, ...]:
-        return self._named([part.names for part in self.parts])
+        return self._named([part.names for part in self.parts], self._entries)
 
     @property
     def velocity_names(self) -> tuple[str, ...]:
-        return self._named([part.velocity_names for part in self.parts])
+        return self._named([part.velocity_names for part in self.parts], self._motions)
 
-    def _named(self, each: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-        return tuple(f"{body}.{name}" for body, names in zip(self.bodies, each, strict=True) for name in names)
+    def _named(self, each: Sequence[tuple[str, ...]], entries: list[np.ndarray]) -> tuple[str, ...]:
+        named = [f"{body}.{name}" for body, names in zip(self.bodies, each, strict=True) for name in names]
+        return tuple(named[i] for i in np.argsort(np.concatenate(entries)))
 
-    @property
+    @cached_property
     def coordinates(self) -> Coordinates:
-        named = zip(self.bodies, self.parts, strict=True)
-        return Coordinates(
-            tuple(block._replace(body=name) for name, part in named for block in part.coordinates.blocks)
-        )
+        named = [
+            block._replace(body=name)
+            for name, part in zip(self.bodies, self.parts, strict=True)
+            for block in part.coordinates.blocks
+        ]
+        return Coordinates(tuple(sorted(named, key=lambda block: block.kind != PLACE)))
+
+    @cached_property
+    def _entries(self) -> list[np.ndarray]:
+        """Which coordinates belong to each body."""
+        return [np.flatnonzero(self.coordinates.of_body(body)[0]) for body in self.bodies]
+
+    @cached_property
+    def _motions(self) -> list[np.ndarray]:
+        """Which independent velocities belong to each body."""
+        return [np.flatnonzero(self.coordinates.of_body(body)[1]) for body in self.bodies]
 
     @property
     def dimension(self) -> int:
         return self.parts[0].dimension
 
     def cut(self, column: Any) -> list[Any]:
-        """The entries of a column that belong to each body."""
-        return ca.vertsplit(ca.SX(column), list(accumulate((part.size for part in self.parts), initial=0)))
+        """The entries of a column of the size of q that belong to each body."""
+        return [ca.SX(column)[mine.tolist()] for mine in self._entries]
+
+    def _stacked(self, columns: Sequence[Any]) -> Any:
+        """A column of the size of q from the entries of each body."""
+        return ca.vertcat(*columns)[np.argsort(np.concatenate(self._entries)).tolist()]
 
     def _each(self, q: Any, v: Any, m: Any) -> list[tuple[float, Configuration, Any, Any, Any]]:
         """Share, configuration, coordinates, their rates and mass of each body."""
@@ -74,7 +93,7 @@ class Many(Configuration):
             first, second = part.inertia(qs, vs, ms)
             moved.append(ca.SX.zeros(part.size) + share * first)
             along.append(share * second)
-        return ca.vertcat(*moved), ca.vertcat(*along)
+        return self._stacked(moved), self._stacked(along)
 
     def step_inertia(self, h: Any, q: Sequence, move: Any, m: Any) -> list:
         nodes, moves = [self.cut(node) for node in q], self.cut(move)
@@ -85,7 +104,7 @@ class Many(Configuration):
             ]
             for i, (share, part) in enumerate(zip(self.shares, self.parts, strict=True))
         ]
-        return [ca.vertcat(*ends) for ends in zip(*found, strict=True)]
+        return [self._stacked(ends) for ends in zip(*found, strict=True)]
 
     def g(self, q: Any) -> Any:
         return ca.vertcat(*[part.g(qs) for part, qs in zip(self.parts, self.cut(q), strict=True)])
@@ -95,10 +114,20 @@ class Many(Configuration):
         pulls = []
         for part, qs, first, last in zip(self.parts, self.cut(q), counts[:-1], counts[1:], strict=True):
             pulls.append(part.pull(qs, reaction[first:last]) if part.surplus else ca.SX.zeros(part.size))
-        return ca.vertcat(*pulls)
+        return self._stacked(pulls)
 
     def tangent(self, q: Any) -> Any:
-        return ca.diagcat(*[part.tangent(qs) for part, qs in zip(self.parts, self.cut(q), strict=True)])
+        blocks = ca.diagcat(*[part.tangent(qs) for part, qs in zip(self.parts, self.cut(q), strict=True)])
+        rows, columns = (np.argsort(np.concatenate(entries)) for entries in (self._entries, self._motions))
+        return blocks[rows.tolist(), columns.tolist()]
+
+    def pieces(self) -> list[tuple[Configuration, Any, Any, float]]:
+        return [
+            (part, mine.tolist(), moving.tolist(), share)
+            for part, mine, moving, share in zip(
+                self.parts, self._entries, self._motions, self.shares, strict=True
+            )
+        ]
 
     def body(self, q: Any, v: Any, m: Any = None) -> Body:
         each = self.members(q, v, 1.0)
@@ -117,8 +146,8 @@ class Many(Configuration):
 
     def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
         places = zip(self.bodies, self.parts, self.cut(q), strict=True)
-        return ca.vertcat(
-            *[
+        return self._stacked(
+            [
                 part.on(name, qs, force, torque) if body == name else ca.SX.zeros(part.size)
                 for body, part, qs in places
             ]

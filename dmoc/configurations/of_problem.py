@@ -13,16 +13,11 @@ from dmoc.configurations.rigid import RigidBody
 
 def configuration_of(problem: Any) -> Configuration:
     """The configuration of a transfer problem's body."""
-    free = _free(problem)
+    free = free_configuration(problem)
     return Linked(free, problem.links) if problem.links else free
 
 
-def link_sizes(problem: Any) -> list[int]:
-    """How many equations each link of a problem is."""
-    return [Linked(_free(problem), (link,)).joined for link in problem.links]
-
-
-def _free(problem: Any) -> Configuration:
+def free_configuration(problem: Any) -> Configuration:
     """The configuration of the bodies without links."""
     if problem.system is not None:
         bodies = problem.system.bodies

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import QUATERNION, columns_of, rotation_of
 from dmoc.configurations.base import AXES, Configuration
 from dmoc.configurations.coordinates import Coordinates
@@ -132,3 +133,72 @@ class RigidBody(Configuration):
         """
         inertia, rate = self._per_mass(m), w[self.before :]
         return ca.vertcat(force, ca.solve(inertia, torque - ca.cross(rate, inertia @ rate)))
+
+
+def newton_euler(body: Configuration, state: tuple, acts: tuple, f: Any) -> Any:
+    """dw/dt by Newton's equation of each centre of mass and Euler's equations of each rate.
+
+    `state` is t, q, dq/dt, w, m; `acts` are dl/dq, dl/dv and F/m of the effects, without the kinetic energy.
+    What the actuator does is `f`: forces [N], motor torques and torques in body axes [N m].
+
+    Raises
+    ------
+    ValueError
+        If a potential depends on the rate.
+    """
+    (t, q, slope, w, m), (dldq, dldv, push) = state, acts
+    pulled, found = dldq + push, ca.SX.zeros(body.freedom)
+    turned = body.along(q, pulled)
+    for part, mine, moving, share in body.pieces():
+        one: Any = part
+        axes, before, mass = one.axes, one.before, m if share == 1.0 else share * m
+        own, given = dldv[mine], f[moving]
+        if ca.depends_on(own[before:], slope):
+            raise ValueError("a BodyConservative's lagrangian depends on the rate; state it as a BodyForce")
+        change = ca.jacobian(own[:axes], q) @ slope + ca.jacobian(own[:axes], t)
+        inertia = ca.DM.eye(axes) * share + ca.jacobian(own[:axes], slope[mine][:axes])
+        pull = pulled[mine][:axes] + given[:axes] / m - change
+        along = ca.solve(inertia, pull) if axes else ca.SX.zeros(0)
+        torque = (turned[moving][before:] + one.turning_share(m) * given[before:] / m) / share
+        found[moving] = one.accelerations(w[moving], along, torque, given[axes:before], mass)
+    return found
+
+
+def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
+    """An inertia in body axes [kg m^2] as a symmetric matrix: from three numbers or a matrix.
+
+    Raises
+    ------
+    ValueError
+        If it is no inertia of a body: not symmetric, not positive, or one principal moment above the sum of
+        the others.
+    """
+    given = entries(value)
+    rows = None if given is None else [entries(row) for row in given]
+    if given is None or len(given) != len(AXES) or rows is None:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    if all(row is None for row in rows):
+        moments = [number(f"inertia[{i}]", x, "kg m^2", positive=True) for i, x in enumerate(given)]
+        matrix = np.diag(moments)
+    elif all(row is not None and len(row) == len(AXES) for row in rows):
+        matrix = np.array(
+            [
+                [number(f"inertia[{i}][{j}]", x, "kg m^2") for j, x in enumerate(row or ())]
+                for i, row in enumerate(rows)
+            ]
+        )
+    else:
+        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
+    size = np.abs(matrix).max()
+    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
+        raise ValueError(f"inertia must be symmetric [kg m^2]; got {short(value)}")
+    small, middle, large = np.linalg.eigvalsh(matrix)
+    if small <= 0:
+        raise ValueError(f"inertia must have positive principal moments [kg m^2]; the smallest is {small:.3g}")
+    # A flat plate has equality; the rounding of numbers with nine digits is allowed for.
+    if large > (small + middle) * (1 + 1e-9):
+        raise ValueError(
+            f"no body has the principal moments {small:.4g}, {middle:.4g}, {large:.4g} kg m^2: none can be "
+            "more than the sum of the two others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in 0.5 * (matrix + matrix.T))

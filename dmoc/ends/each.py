@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, short
+from dmoc.basics.quaternions import AXES, rotation_of
+from dmoc.effects.base import Body
 from dmoc.ends.base import Boundary, State
+from dmoc.ends.joint_states import JointState, carried_along
+from dmoc.ends.poses import Pose, Turning
+from dmoc.links.holonomic import Holonomic
+from dmoc.links.system import System
+from dmoc.parts.rows import Row
 
 
 @dataclass(frozen=True)
@@ -19,11 +26,17 @@ class Each(Boundary):
     Parameters
     ----------
     names : tuple of str
-    states : tuple of State
+    states : tuple of State or Pose
+    joints : tuple of (Holonomic, JointState)
+        What is asked of joints between bodies whose states are free.
+    led : tuple of str
+        The bodies whose states follow from those of joints.
     """
 
     names: tuple[str, ...]
-    states: tuple[State, ...]
+    states: tuple[Boundary, ...]
+    joints: tuple[tuple[Holonomic, JointState], ...] = ()
+    led: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         sizes = {state.dimension for state in self.states}
@@ -37,37 +50,119 @@ class Each(Boundary):
 
     @property
     def structure(self) -> tuple:
-        return type(self), self.names
+        return type(self), self.names, self.joints
+
+    @property
+    def turns_body(self) -> bool:
+        return any(state.turns_body for state in self.states)
+
+    def oriented(self, start: Boundary) -> Boundary:
+        """Each attitude with the sign to which the shorter turn leads; that of joints is theirs."""
+        begins = start.states if isinstance(start, Each) else self.states
+        pairs = zip(self.names, self.states, begins, strict=True)
+        states = tuple(one if name in self.led else one.oriented(begin) for name, one, begin in pairs)
+        return Each(self.names, states, self.joints, self.led)
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         known = [state.fixed() for state in self.states]
-        return np.concatenate([q for q, _ in known]), np.concatenate([v for _, v in known])
+        return tuple(_places_first([one[i] for one in known], self.dimension) for i in (0, 1))  # type: ignore
+
+    def likely(self, start: Boundary) -> np.ndarray:
+        """Coordinates for a guess: what is free stays where it starts, and joints carry what is on them."""
+        begins = start.states if isinstance(start, Each) else self.states
+        known = dict(zip(self.names, begins, strict=True))
+        asked = [(joint, JointState(state.value)) for joint, state in self.joints if state.value is not None]
+        carried = {joint.holds[-1] for joint, _ in asked}
+        bases = {name: state for name, state in known.items() if name not in carried}
+        turning = [name for name, state in known.items() if state.turns_body]
+        led, _ = carried_along(bases, asked, turning, (), self.dimension)
+        return _places_first([(known | led)[name].fixed()[0] for name in self.names], self.dimension)
+
+    def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
+        if not self.joints:
+            return []
+        at = self._bodies(q, v)
+        found = []
+        for joint, state in self.joints:
+            found += state.rows_of(joint, at)
+        return found
+
+    def _bodies(self, q: Any, v: Any) -> dict[str, Body]:
+        """The bodies by name, for CasADi coordinates and independent velocities."""
+        axes, count = self.dimension, len(self.names)
+        turn, rate, found = count * axes, count * axes, {}
+        for i, (name, state) in enumerate(zip(self.names, self.states, strict=True)):
+            mine = slice(i * axes, (i + 1) * axes)
+            found[name] = Body(q[mine], v[mine])
+            if state.turns_body:
+                attitude = q[turn : turn + 4]
+                spin = v[rate : rate + AXES]
+                found[name] = Body(q[mine], v[mine], attitude, rotation_of(attitude), spin)
+                turn, rate = turn + 4, rate + AXES
+        return found
 
     def words(self) -> str:
-        named = zip(self.names, self.states, strict=True)
-        return "; ".join(f"{name}: {state.words()}" for name, state in named)
+        named = [f"{name}: {state.words()}" for name, state in zip(self.names, self.states, strict=True)]
+        return "; ".join([*named, *(f"{joint.words()}: {state.words()}" for joint, state in self.joints)])
 
 
-def each_of(name: str, given: Any, bodies: tuple[str, ...]) -> Each:
-    """The ends of all bodies, from a dictionary of states by name; a body that is not named is free.
+def _places_first(parts: Sequence[np.ndarray], axes: int) -> np.ndarray:
+    """Columns of bodies joined: first the places of all, then what turns."""
+    return np.concatenate([*[part[:axes] for part in parts], *[part[axes:] for part in parts]])
+
+
+def each_of(name: str, given: Any, system: System, links: Sequence[Holonomic]) -> Each:
+    """The ends of all bodies, from a dictionary of states by name of a body, or by joint.
+
+    A body that is not named, and does not follow from joints, is free.
 
     Raises
     ------
     ValueError
-        If it names no body of the system, or something other than states.
+        If it names no body or joint of the system, or something other than states.
     """
     if isinstance(given, Each):
         return given
+    bodies = system.names
     if not isinstance(given, Mapping):
         raise ValueError(
             f"{name} of a system must be a dictionary such as {{{bodies[0]!r}: State(position, velocity)}}; "
             f"got {short(given)}"
         )
-    if strangers := [key for key in given if key not in bodies]:
-        raise ValueError(f"{name} names {short(strangers[0])}; the bodies are {', '.join(bodies)}")
+    states: dict[str, Boundary] = {}
+    joints: list[tuple[Holonomic, JointState]] = []
     for key, state in given.items():
-        if not isinstance(state, State):
-            raise ValueError(f"{name} of {key} must be a State(position, velocity); got {short(state)}")
-    axes = next((state.dimension for state in given.values()), 0)
-    free = State((None,) * axes, (None,) * axes)
-    return Each(bodies, tuple(given.get(body, free) for body in bodies))
+        if isinstance(key, Holonomic):
+            if key not in links:
+                raise ValueError(
+                    f"{name} names a {type(key).__name__} that is none of the links; list it there"
+                )
+            joints.append((key, JointState.checked_for(name, key, state)))
+        elif key in bodies:
+            states[key] = _of_body(name, key, state, system)
+        else:
+            raise ValueError(f"{name} names {short(key)}; the bodies are {', '.join(bodies)}")
+    axes = next((state.dimension for state in states.values()), AXES if system.turns else 0)
+    axes = axes or next((len(v) for link in links for v in [getattr(link, "anchor", ())] if len(v) > 1), 0)
+    turning = [body.name for body in system.bodies if body.inertia is not None]
+    led, left = carried_along(states, joints, turning, links, axes)
+    free = {one: _free(axes, one in turning) for one in bodies}
+    return Each(bodies, tuple((free | states | led)[body] for body in bodies), left, tuple(led))
+
+
+def _of_body(name: str, body: str, state: Any, system: System) -> Any:
+    """The state of one body: a State of a point mass, a Pose of one that turns."""
+    turns = next(one.inertia is not None for one in system.bodies if one.name == body)
+    if turns and type(state) is State:
+        # A place alone leaves it open how the body is turned.
+        return Pose(state.position, state.velocity, None, None)
+    wanted: type = Pose if turns else State
+    if not isinstance(state, wanted) or (isinstance(state, Turning) and not turns):
+        example = "Pose(position, velocity, attitude, rate)" if turns else "State(position, velocity)"
+        raise ValueError(f"{name} of {body} must be a {example}; got {short(state)}")
+    return state
+
+
+def _free(axes: int, turns: bool) -> Boundary:
+    none = (None,) * axes
+    return Pose(none, none, None, None) if turns else State(none, none)

@@ -8,13 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.arguments import FreeVector, Vector, checked, entries, flag, number, short, vector
-from dmoc.basics.quaternions import AXES, QUATERNION, rotation_vectors
+from dmoc.basics.arguments import FreeVector, Vector, checked, flag, number, short, vector
+from dmoc.basics.quaternions import AXES, QUATERNION, rotation_vectors, unit_quaternion
 from dmoc.ends.base import Boundary, State
-
-# A quaternion may be longer or shorter than 1 by this part before it is refused [-]: numbers that were written
-# with four digits are made unit quaternions, others are probably no attitudes.
-NEARLY_UNIT = 1e-3
 
 
 def rotation(axis: Vector, degrees: float) -> tuple[float, float, float, float]:
@@ -189,19 +185,7 @@ def _quaternion(value: Any) -> tuple[float, ...] | None:
     """A unit quaternion, or None for a free one."""
     if value is None:
         return None
-    parts = entries(value)
-    if parts is None or len(parts) != QUATERNION:
-        raise ValueError(
-            "an attitude must be a unit quaternion of 4 numbers, scalar first [-], as rotation(axis, degrees) "
-            f"gives, or None; got {short(value)}"
-        )
-    found = np.array([number(f"quaternion[{i}]", part, "-") for i, part in enumerate(parts)])
-    length = float(np.linalg.norm(found))
-    if abs(length - 1) > NEARLY_UNIT:
-        raise ValueError(
-            f"an attitude must be a unit quaternion [-]; got {short(value)} of length {length:.6g}"
-        )
-    return tuple(float(x) for x in found / length)
+    return unit_quaternion(value)
 
 
 def _rate(value: Any) -> tuple[float | None, ...]:

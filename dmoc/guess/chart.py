@@ -95,7 +95,7 @@ def drafted(number: Callable[[str], Any], place: Any) -> tuple[Any, Any]:
 def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) -> Chart | None:
     """The chart around a guess; None where such unknowns do not suit the problem."""
     lone, n = problem.attraction.lone, problem.dimension
-    turns = problem.inertia is not None or bool(problem.links)
+    turns = problem.turns or bool(problem.links)
     if lone is None or turns or guess.hold or problem.constraints or not _turns_with_it(problem):
         return None
     if angle_around(problem, guess) < 2 * np.pi * VERY_MANY_TURNS:

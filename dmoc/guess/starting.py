@@ -42,7 +42,7 @@ def starting_guess(
     given = problem.guess if given is None else given
     force = getattr(given, "force", None)
     given = getattr(given, "path", given)
-    if problem.inertia is not None:
+    if problem.inertia is not None and not problem.links:
         # What turns bodies is loaded for problems with such bodies alone.
         from dmoc.guess.turning import turning_guess
 
@@ -57,16 +57,18 @@ def starting_guess(
         return given.onto(mesh, order, hold)
     fractions = node_fractions(mesh, scheme(order))
     duration = duration or guess_duration(problem)
-    if given is None and not problem.links:
+    linked = problem.links or problem.system is not None
+    if given is None and not linked:
         for found in (_least_effort, _past_attractors):
             if (best := found(problem, mesh, order, hold, duration)) is not None:
                 return best
     places = len(mesh) - 1 if hold else len(fractions)
     control, spiral, ends = np.zeros((places, problem.controls)), False, ()  # type: tuple[Any, bool, Any]
-    if given is None and problem.links:
-        from dmoc.links.along import guess_along
+    made_of = None
+    if linked and (given is None or problem.turns):
+        from dmoc.guess.turning import linked_guess
 
-        position, ends = guess_along(problem, fractions)
+        position, ends, made_of = linked_guess(problem, given, duration, fractions)
     elif given is None:
         position, ends, spiral = _default_path(problem, duration, fractions)
     else:
@@ -85,7 +87,7 @@ def starting_guess(
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
     mass = np.full(len(fractions), problem.mass)
-    guess = DiscretePath(mesh, order, hold, duration, position, control, mass, *ends)
+    guess = replace(DiscretePath(mesh, order, hold, duration, position, control, mass, *ends), made_of=made_of)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 
@@ -287,14 +289,3 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
     path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
     return path, (v0, v1), worth
-
-
-def followed(problem: TransferProblem, given: Any) -> TransferProblem:
-    """The problem whose goal has the sign of its quaternion to which a former path leads."""
-    path = getattr(given, "path", given)
-    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
-        return problem
-    ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
-    signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
-    # NaN, where an end leaves its attitude open, is not less than 0.
-    return replace(problem, goal=problem.goal.the_other_way()) if signs[0] * signs[1] < 0 else problem

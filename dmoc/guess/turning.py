@@ -18,6 +18,7 @@ from dmoc.basics.quaternions import (
     turned_by,
 )
 from dmoc.configurations.of_problem import configuration_of
+from dmoc.links.along import guess_along
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
@@ -81,7 +82,7 @@ def turning_duration(problem: TransferProblem) -> float:
     if limit is None or not problem.free_duration:
         return middle
     q0, w0, q1, w1 = turning_states(problem, middle)
-    acceleration = limit / (float(np.trace(np.array(problem.inertia))) / 3)
+    acceleration = limit / problem.moment
     angle = float(angle_between(q0, q1))
     needed = 2 * np.sqrt(angle / acceleration) + float(np.linalg.norm(w1 - w0)) / acceleration
     return float(np.clip(LEISURE * needed, shortest, longest)) if needed > 0 else middle
@@ -134,6 +135,18 @@ def checked_turning(
         if float(position[-1, at] @ goal) < 0:
             position[:, at] *= -1
     return position
+
+
+def linked_guess(
+    problem: TransferProblem, given: Any, duration: float, fractions: np.ndarray
+) -> tuple[np.ndarray, tuple[np.ndarray, ...], Any]:
+    """Coordinates of bodies that links hold, their velocities at both ends, and what they are made of."""
+    made_of = configuration_of(problem).coordinates
+    if given is None:
+        return *guess_along(problem, fractions), made_of
+    position = checked_turning(problem, given, fractions, problem.start_time + duration * fractions)
+    ends = tuple(np.nan_to_num(end.fixed()[1]) for end in (problem.start, problem.goal))
+    return position, ends, made_of
 
 
 def turning_guess(

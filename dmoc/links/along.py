@@ -7,8 +7,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.quaternions import slerp
 from dmoc.configurations.base import Configuration
+from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.configurations.of_problem import configuration_of
+from dmoc.effects.base import Body
 
 # A path is followed in pieces of this part of the distance between its ends.
 PIECE = 0.01
@@ -35,31 +38,37 @@ def guess_along(problem: Any, fractions: np.ndarray) -> tuple[np.ndarray, tuple[
     (start, first), (goal, last) = problem.start.fixed(), problem.goal.fixed()
     if np.isnan(start).any():
         raise ValueError("a body on links needs a start whose position is known, or a guess of the path")
-    path = along_links(problem, configuration_of(problem), (start, goal), fractions)
+    likely = problem.goal.likely(problem.start) if problem.system is not None else start
+    path = along_links(problem, configuration_of(problem), (start, goal, likely), fractions)
     return path, (np.nan_to_num(first), np.nan_to_num(last))
 
 
 def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.ndarray) -> np.ndarray:
     """Coordinates at fractions of the way between two ends that keep to the links, shape (count, size).
 
+    The ends are those of start and goal, and values for entries of the goal that are free, which are NaN.
+
     Rods turn evenly from their first to their last direction, the other bodies go straight. Where links know
-    no such way, the path goes on from place to place towards the goal as far as they let it. Entries of the
-    goal that are NaN are free.
+    no such way, the path goes on from place to place towards the goal as far as they let it.
     """
-    start, goal = ends
+    start, goal, likely = ends
     on = _OnLinks(body)
-    aim = on.put(np.where(np.isnan(goal), start, goal), ~np.isnan(goal))
+    aim = on.put(np.where(np.isnan(goal), likely, goal), ~np.isnan(goal))
     straight = start + fractions[:, None] * (aim - start)
-    names = problem.system.names if problem.system is not None else ("",)
-    places = dict(zip(names, np.split(straight, len(names), axis=1), strict=True))
-    knows = []
-    for link in problem.links:
-        led = link.led(places, fractions)
-        knows.append(led is not None)
-        places |= led or {}
+    for turning in body.coordinates.quaternions:
+        straight[:, turning] = slerp(start[turning], aim[turning], fractions)
+    at, knows, waiting = states_of(body, straight), False, list(problem.links)
+    while waiting:
+        # What sits on a body that another link carries waits for that one; of a ring the first begins.
+        carried = {name for link in waiting for name in link.holds[-1:]}
+        link = next((one for one in waiting if not carried & set(one.holds[:-1])), waiting[0])
+        waiting.remove(link)
+        led = link.led(at, fractions)
+        knows |= led is not None
+        at |= led or {}
     # A rail is straight: what goes straight keeps to it.
-    path = np.hstack([places[name] for name in names])
-    if not any(knows) and np.abs(on.gaps(straight)).max() > BENT * float(np.linalg.norm(aim - start)):
+    path = coordinates_of(body, at)
+    if not knows and np.abs(on.gaps(straight)).max() > BENT * float(np.linalg.norm(aim - start)):
         path = _step_by_step(on, start, aim, fractions)
     return np.array([on.put(place) for place in path])
 
@@ -83,12 +92,30 @@ def _step_by_step(on: _OnLinks, start: np.ndarray, aim: np.ndarray, fractions: n
     return np.stack([np.interp(fractions * way[-1], way, column) for column in path.T], axis=1)
 
 
+def states_of(body: Configuration, path: np.ndarray) -> dict[str, Body]:
+    """Places and attitudes of each body by its name, from coordinates of shape (count, size)."""
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for block, part in zip(body.coordinates.blocks, body.coordinates.cut(path), strict=True):
+        kind = "attitude" if block.kind == ATTITUDE else "position"
+        found.setdefault(block.body, {})[kind] = part
+    return {name: Body(parts["position"], None, parts.get("attitude")) for name, parts in found.items()}
+
+
+def coordinates_of(body: Configuration, at: dict[str, Body]) -> np.ndarray:
+    """The coordinates of bodies, shape (count, size)."""
+    blocks = body.coordinates.blocks
+    return np.hstack(
+        [at[one.body].attitude if one.kind == ATTITUDE else at[one.body].position for one in blocks]
+    )
+
+
 class _OnLinks:
     """Links as functions of the place."""
 
     def __init__(self, body: Configuration):
         q = ca.SX.sym("q", body.size)
-        g = body.links_at(q)
+        # Attitudes stay unit quaternions on the way.
+        g = body.g(q) if body.surplus else body.links_at(q)
         self.function = ca.Function("links", [q], [ca.densify(g), ca.densify(ca.jacobian(g, q))])
 
     def _at(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -41,20 +41,25 @@ class Holonomic(Part, ABC):
         return self.g(at[getattr(self, "on", "")].position)
 
     @property
+    def row_units(self) -> tuple[str, ...]:
+        """The units of the entries of g; `unit` for as many as there are if it is empty."""
+        return ()
+
+    @property
     def holds(self) -> tuple[str, ...]:
         """The names of the bodies that it holds; an only body has an empty name."""
         return (getattr(self, "on", ""),)
 
-    def led(self, places: dict[str, np.ndarray], fractions: np.ndarray) -> dict[str, np.ndarray] | None:
-        """Places of the bodies that it holds, shape (count, dimension) each, led from the first to the last.
+    def led(self, at: dict[str, Body], fractions: np.ndarray) -> dict[str, Body] | None:
+        """The body that it carries, by its name, led from its first to its last state.
 
-        Between these `places` go on a straight line, or as other links have led them. None where the link
-        knows no way.
+        The states `at` are arrays of one row a time: a straight line, or as other links have led them. None
+        where the link knows no way.
         """
         return None
 
-    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
-        """Lines that a picture draws of it for places of the bodies, (times, points, dimension) each [m]."""
+    def lines(self, at: dict[str, Body]) -> list[np.ndarray]:
+        """Lines that a picture draws of it for states of bodies, (times, points, dimension) each [m]."""
         return []
 
     def check_dimension(self, dimension: int) -> None:

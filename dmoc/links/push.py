@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
 from dmoc.basics.digits import up
+from dmoc.links.joints import Prismatic, Revolute, Spherical
 from dmoc.links.rods import Rod
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row
@@ -18,72 +19,74 @@ from dmoc.parts.rows import Row
 
 @dataclass(frozen=True)
 class JointTorque(Actuator):
-    """A motor that turns a rod in the plane, against the room or against another rod.
+    """A motor in a joint, or one that turns a rod in the plane.
 
     Parameters
     ----------
-    rod : Rod
-        The rod that it turns, one of the links.
+    joint : Revolute, Spherical or Rod
+        One of the links. In a ball joint there are three torques, in axes of the body that the joint carries.
     limit : float, optional
         Largest torque [N m]; none if not given.
     against : Rod, optional
-        The rod on which the motor sits; it stands in the room if not given.
+        Of a rod: the rod on which the motor sits; it stands in the room if not given.
     """
 
-    rod: Rod
+    joint: Any
     limit: float | None = None
     against: Rod | None = None
     adjustable: ClassVar[tuple[str, ...]] = ()
     effort_unit: ClassVar[str] = "N^2 m^2 s"
+    unit: ClassVar[str] = "N m"
+    word: ClassVar[str] = "torque"
 
     def __post_init__(self) -> None:
-        of_kind("JointTorque: rod", self.rod, Rod)
+        name = type(self).__name__
+        self._check_joint(name)
         if self.against is not None:
-            of_kind("JointTorque: against", self.against, Rod)
+            of_kind(f"{name}: against", self.against, Rod)
+            of_kind(f"{name}: joint of a motor that sits on a rod", self.joint, Rod)
         if self.limit is not None:
-            checked(self, limit=number("JointTorque: limit", self.limit, "N m", positive=True))
+            checked(self, limit=number(f"{name}: limit", self.limit, self.unit, positive=True))
+
+    def _check_joint(self, name: str) -> None:
+        if not isinstance(self.joint, (Rod, Revolute, Spherical)):
+            raise ValueError(f"{name}: joint must be a Revolute, Spherical or Rod; got {short(self.joint)}")
 
     @property
     def structure(self) -> tuple:
-        return type(self), self.rod, self.against, self.limit is None
+        return type(self), self.joint, self.against, self.limit is None
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        rods = [self.rod] if self.against is None else [self.rod, self.against]
-        return tuple(name for rod in rods for name in rod.holds)
+        joints = [self.joint] if self.against is None else [self.joint, self.against]
+        return tuple(name for joint in joints for name in joint.holds)
 
     def check_dimension(self, dimension: int) -> None:
-        if dimension != 2:
+        if isinstance(self.joint, Rod) and dimension != 2:
             raise ValueError(
                 f"JointTorque turns rods in the plane; the positions have {dimension} entries, not 2"
             )
 
     def size(self, dimension: int) -> int:
-        return 1
+        return self.joint.motors
 
     def labels(self, dimension: int) -> tuple[str, ...]:
-        return (f"torque.{self.rod.on}" if self.rod.on else "torque",)
+        name = f"{self.word}.{self.joint.name}".rstrip(".")
+        return (name,) if self.joint.motors == 1 else tuple(f"{name}.{axis}" for axis in "xyz")
 
     def units(self, dimension: int) -> tuple[str, ...]:
-        return ("N m",)
+        return (self.unit,) * self.joint.motors
 
     def effort(self, u: Any) -> Any:
         return ca.dot(u, u)
 
     def acts(self, configuration: Any, q: Any, u: Any) -> Any:
-        # The torque works on the angle between the rods: its force on q is that angle's slope.
-        place = ca.SX.sym("q", configuration.size)
-        at = {name: body for name, body, _ in configuration.members(place, 0 * place, 1.0)}
-        signed = [(1.0, self.rod)] + ([] if self.against is None else [(-1.0, self.against)])
-        slope = ca.SX.zeros(configuration.size)
-        for sign, rod in signed:
-            arm = rod.arm(at)
-            across = ca.vertcat(-arm[1], arm[0]) / ca.dot(arm, arm)
-            slope += sign * ca.jacobian(arm, place).T @ across
-        return ca.Function("slope", [place], [slope])(q) * u
+        at = {name: body for name, body, _ in configuration.members(q, ca.SX.zeros(configuration.size), 1.0)}
+        acts = self.joint.driven(configuration, q, at, u)
+        return acts if self.against is None else acts - self.against.driven(configuration, q, at, u)
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        most = np.full(1, np.inf if self.limit is None else self.limit)
+        most = np.full(self.joint.motors, np.inf if self.limit is None else self.limit)
         return -most, most
 
     def torque_limit(self) -> float | None:
@@ -91,17 +94,18 @@ class JointTorque(Actuator):
 
     @property
     def limit_unit(self) -> str:
-        return "N m"
+        return self.unit
 
     def times(self, factor: float) -> JointTorque:
         return self if self.limit is None else replace(self, limit=factor * self.limit)
 
     @property
     def limit_words(self) -> str:
-        return "joint torque"
+        return f"joint {self.word}"
 
     def needs(self, eased: Actuator) -> str:
-        return f"a joint torque of {up(eased.torque_limit() or 0.0)} N m (you gave {self.limit:g} N m)"
+        enough = up(eased.main_limit() or 0.0)
+        return f"a joint {self.word} of {enough} {self.unit} (you gave {self.limit:g} {self.unit})"
 
     def unlimited(self) -> Actuator:
         return replace(self, limit=None)
@@ -110,26 +114,55 @@ class JointTorque(Actuator):
         return float(np.abs(u).max(initial=0.0)) / (self.limit or np.inf)
 
     def violation(self, value: float, unit: str) -> tuple[float, str]:
-        return value * (self.limit or 1.0), "N m"
+        return value * (self.limit or 1.0), self.unit
 
     def words(self) -> str:
+        limit = "without a limit" if self.limit is None else f"of at most {self.limit:g} {self.unit}"
+        if not isinstance(self.joint, Rod):
+            return f"a {self.word} {limit} in the joint of {self.joint.on or 'the body'}"
         where = f"on the rod of {self.against.on or 'the body'}" if self.against else "in the room"
-        limit = "without a limit" if self.limit is None else f"of at most {self.limit:g} N m"
-        return f"a torque {limit} on the rod of {self.rod.on or 'the body'}, its motor {where}"
+        return f"a torque {limit} on the rod of {self.joint.on or 'the body'}, its motor {where}"
+
+
+@dataclass(frozen=True)
+class JointForce(JointTorque):
+    """A motor that pushes along a slide.
+
+    Parameters
+    ----------
+    joint : Prismatic
+        One of the links.
+    limit : float, optional
+        Largest force [N]; none if not given.
+    """
+
+    against: None = None
+    effort_unit: ClassVar[str] = "N^2 s"
+    unit: ClassVar[str] = "N"
+    word: ClassVar[str] = "force"
+
+    def _check_joint(self, name: str) -> None:
+        of_kind(f"{name}: joint", self.joint, Prismatic)
+
+    def torque_limit(self) -> float | None:
+        return None
+
+    def force_limit(self) -> float | None:
+        return self.limit
 
 
 @dataclass(frozen=True)
 class On(Actuator):
-    """An actuator of point masses that pushes one body of a system.
+    """An actuator that pushes one body of a system.
 
     Parameters
     ----------
     body : str
         Its name.
     push : Actuator
-        Such as `BoxForce(10)`, or `FreeForce()`.
+        Such as `BoxForce(10)` or, of a body that turns, `Torque(1)`, `Wrench()`, `Thrusters(...)`.
     axes : sequence of int, optional
-        The axes along which it pushes, 0 for x; all if not given.
+        Of a force: the axes along which it pushes, 0 for x; all if not given.
     """
 
     body: str
@@ -144,7 +177,11 @@ class On(Actuator):
             raise ValueError(
                 f"On: {type(self.push).__name__} burns propellant; bodies of a system keep their masses"
             )
+        if self.push.wheel_axes:
+            raise ValueError("On: wheels are for a single body so far; use a Torque")
         if self.axes is not None:
+            if self.push.turns_body:
+                raise ValueError(f"On: axes are for a force; leave them out with {type(self.push).__name__}")
             given = entries(self.axes)
             if not given or not all(type(axis) is int and axis in (0, 1, 2) for axis in given):
                 raise ValueError(
@@ -175,6 +212,8 @@ class On(Actuator):
         return self.push.size(len(self._axes(dimension)))
 
     def labels(self, dimension: int) -> tuple[str, ...]:
+        if self.push.turns_body:
+            return tuple(f"{self.body}.{label}" for label in self.push.labels(dimension))
         return tuple(f"{self.body}.{'xyz'[axis]}" for axis in self._axes(dimension))
 
     def units(self, dimension: int) -> tuple[str, ...]:
@@ -184,6 +223,10 @@ class On(Actuator):
         return self.push.effort(u)
 
     def acts(self, configuration: Any, q: Any, u: Any) -> Any:
+        if self.push.turns_body:
+            members = configuration.members(q, ca.SX.zeros(configuration.size), 1.0)
+            rotation = next(body.rotation for name, body, _ in members if name == self.body)
+            return configuration.on(self.body, q, *self.push.wrench(rotation, u))
         whole, force = ca.SX.zeros(configuration.dimension), ca.SX(self.push.force(u))
         for i, axis in enumerate(self._axes(configuration.dimension)):
             whole[axis] = force[i]
@@ -197,6 +240,13 @@ class On(Actuator):
 
     def force_limit(self) -> float | None:
         return self.push.force_limit()
+
+    def torque_limit(self) -> float | None:
+        return self.push.torque_limit()
+
+    @property
+    def effort_unit(self) -> str:  # type: ignore[override]
+        return self.push.effort_unit
 
     def excess(self, u: np.ndarray) -> np.ndarray:
         return self.push.excess(u)

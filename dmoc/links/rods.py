@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -64,15 +64,60 @@ class Rod(Holonomic):
         foot = at[self.anchor].position if isinstance(self.anchor, str) else ca.vertcat(*self.anchor)
         return at[self.on].position - foot
 
-    def led(self, places: dict[str, np.ndarray], fractions: np.ndarray) -> dict[str, np.ndarray] | None:
-        body = places[self.on]
-        foot = places[self.anchor] if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, body.shape)
-        return {self.on: foot + turned_evenly(body[0] - foot[0], body[-1] - foot[-1], fractions)}
+    # In the plane the angle of the rod from the x axis says where it is.
+    coordinates: ClassVar[int] = 1
+    motors: ClassVar[int] = 1
+    coordinate_units: ClassVar[tuple[str, str]] = ("rad", "rad/s")
 
-    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
-        body = places[self.on]
-        foot = places[self.anchor] if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, body.shape)
-        return [np.stack([foot, body], axis=1)]
+    @property
+    def name(self) -> str:
+        """What its angle and its motor are called: by the body at its end."""
+        return self.on
+
+    def off(self, at: Mapping[str, Body], value: Any) -> Any:
+        """By how much its angle is off a value: twice the sine of half of it, which has no jumps."""
+        arm, (x, y) = self.arm(at), (np.cos(value), np.sin(value))
+        along, across = (arm[0] * x + arm[1] * y) / self.length, (arm[1] * x - arm[0] * y) / self.length
+        return 2 * ca.sin(0.5 * ca.atan2(across, along))
+
+    def rate(self, at: Mapping[str, Body]) -> Any:
+        """The rate of its angle [rad/s]."""
+        arm, base = self.arm(at), self.anchor
+        moves = at[self.on].velocity - (at[base].velocity if isinstance(base, str) else 0)
+        return (arm[0] * moves[1] - arm[1] * moves[0]) / self.length**2
+
+    def posed(self, base: Body, value: np.ndarray, rate: np.ndarray) -> Body:
+        """The body at its end, from that at its anchor and from its angle and the rate of that."""
+        foot, pace = base.position, base.velocity
+        if not isinstance(self.anchor, str):
+            foot, pace = np.array([self.anchor]), np.zeros(2)
+        if foot.shape[1] != 2:
+            raise ValueError("Rod: an angle says where it is in the plane alone; give the state of its body")
+        way = np.hstack([np.cos(value), np.sin(value)])
+        across = np.hstack([-way[:, 1:], way[:, :1]])
+        return Body(foot + self.length * way, pace + self.length * rate * across)
+
+    def driven(self, configuration: Any, q: Any, at: Mapping[str, Body], u: Any) -> Any:
+        """The column of the size of q by which a motor at its anchor acts, whose reaction is elsewhere."""
+        # The torque works on the angle of the rod: its force on q is that angle's slope.
+        place = ca.SX.sym("q", configuration.size)
+        arm = self.arm({name: body for name, body, _ in configuration.members(place, 0 * place, 1.0)})
+        across = ca.vertcat(-arm[1], arm[0]) / ca.dot(arm, arm)
+        slope = ca.jacobian(arm, place).T @ across
+        return ca.Function("slope", [place], [slope])(q) * u
+
+    def _foot(self, at: Mapping[str, Body]) -> np.ndarray:
+        """The places of its anchor, one row a time [m]."""
+        shape = np.shape(at[self.on].position)
+        return at[self.anchor].position if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, shape)
+
+    def led(self, at: dict[str, Body], fractions: np.ndarray) -> dict[str, Body] | None:
+        body, foot = at[self.on], self._foot(at)
+        first, last = (body.position[i] - foot[i] for i in (0, -1))
+        return {self.on: body._replace(position=foot + turned_evenly(first, last, fractions))}
+
+    def lines(self, at: dict[str, Body]) -> list[np.ndarray]:
+        return [np.stack([self._foot(at), at[self.on].position], axis=1)]
 
     def _stretched(self, arm: Any) -> Any:
         # Half the square over the length: near zero it is the distance less the length, and a polynomial.
@@ -120,9 +165,9 @@ class Slider(Holonomic):
         across = np.linalg.svd(way[None])[2][1:]
         return ca.DM(across) @ (q - ca.vertcat(*self.point))
 
-    def lines(self, places: dict[str, np.ndarray]) -> list[np.ndarray]:
+    def lines(self, at: dict[str, Body]) -> list[np.ndarray]:
         way, point = np.array(self.direction), np.array(self.point)
-        along = (places[self.on] - point) @ way
+        along = (at[self.on].position - point) @ way
         return [(point + np.array([[along.min()], [along.max()]]) * way)[None]]
 
     def words(self) -> str:

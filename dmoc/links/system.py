@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
+from dmoc.configurations.rigid import checked_inertia
 from dmoc.links.holonomic import Holonomic
 
 # Names of bodies are listed in messages and written beside curves.
@@ -15,7 +16,7 @@ LONGEST_NAME = 40
 
 @dataclass(frozen=True)
 class Member:
-    """A body of a system: a point mass.
+    """A body of a system: a point mass, or with an inertia a rigid body.
 
     Parameters
     ----------
@@ -23,6 +24,8 @@ class Member:
         What links, actuators and ends call it.
     mass : float
         [kg].
+    inertia : 3 floats or 3x3 floats, optional
+        In body axes about its centre of mass [kg m^2], principal moments or a matrix.
     """
 
     name: str
@@ -37,7 +40,7 @@ class Member:
             )
         checked(self, mass=number(f"Member: mass of {self.name}", self.mass, "kg", positive=True))
         if self.inertia is not None:
-            raise ValueError("Member: bodies of a system are point masses so far; leave out the inertia")
+            checked(self, inertia=checked_inertia(self.inertia))
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,11 @@ class System:
     def mass(self) -> float:
         """Of all bodies [kg]."""
         return float(sum(body.mass for body in self.bodies))
+
+    @property
+    def turns(self) -> bool:
+        """Whether one of its bodies turns."""
+        return any(body.inertia is not None for body in self.bodies)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import casadi as ca
 from dmoc.basics.memory import remembered_property
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
+from dmoc.configurations.rigid import newton_euler
 from dmoc.effects.base import Effect
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.forces import FreeForce
@@ -139,20 +140,11 @@ class Dynamics:
         return rate - _taken(inertia, bars, bars @ rate + turning)
 
     def _by_euler(self, t: Any, q: Any, w: Any, m: Any, f: Any) -> Any:
-        """dw/dt of a rigid body: Newton's equation of its centre of mass and Euler's of its rate."""
-        body: Any = self.configuration
-        axes, before = body.axes, body.before
+        """dw/dt of rigid bodies: Newton's equation of their centres of mass and Euler's of their rates."""
         _, _, slope, _ = self.symbols()
-        dldq, dldv, push = point_function(self.effects, body, kinetic=False)(t, q, slope, m)
-        if ca.depends_on(dldv[before:], slope):
-            raise ValueError("a BodyConservative's lagrangian depends on the rate; state it as a BodyForce")
-        change = ca.jacobian(dldv[:axes], q) @ slope + ca.jacobian(dldv[:axes], t)
-        inertia = ca.DM.eye(axes) + ca.jacobian(dldv[:axes], slope[:axes])
-        pulled = dldq + push
-        along = ca.solve(inertia, pulled[:axes] + f[:axes] / m - change) if axes else ca.SX.zeros(0)
-        torque = body.along(q, pulled)[before:] + body.turning_share(m) * f[before:] / m
-        rates = body.accelerations(w, along, torque, f[axes:before], m)
-        return ca.substitute(rates, slope, body.velocity(q, w))
+        acts = point_function(self.effects, self.configuration, kinetic=False)(t, q, slope, m)
+        found = newton_euler(self.configuration, (t, q, slope, w, m), acts, f)
+        return ca.substitute(found, slope, self.configuration.velocity(q, w))
 
     @remembered_property
     def linearised(self) -> tuple[ca.Function, bool]:

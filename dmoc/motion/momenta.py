@@ -228,7 +228,8 @@ def flow_between_links(
     """The flow in the ways that links let be, in bases B that turn along with them as little as they must.
 
     With the slope C of the links, D = d(C w)/dq and the right inverse C+ = M^-1 C' (C M^-1 C')^-1, a small
-    change is dq = B e, dw = B h - C+ D B e, and B changes by -C+ D B. Since B' M B = 1, h = B' M dw.
+    change is dq = B e, dw = B h - C+ D B e. Along the path dq changes by A dq + dw, where A is 0 but for bodies
+    that turn, and B by -C+ (D - C A) B. Since B' M B = 1, h = B' M dw.
     """
     n, held = dynamics.freedom, dynamics.configuration.joined
     q, w = ca.SX.sym("q", dynamics.positions), ca.SX.sym("w", n)
@@ -241,10 +242,12 @@ def flow_between_links(
     basis, root = link_bases(dynamics, position), inertia_root(dynamics, position[0])
     inertia = root @ root.T
     light = np.linalg.solve(inertia, bars.transpose(0, 2, 1))
+    moving = flow[:, :n, :n] @ basis
     across = -light @ np.linalg.solve(bars @ light, bending @ basis)
+    turned = across + light @ np.linalg.solve(bars @ light, bars @ moving)
     back = basis.transpose(0, 2, 1) @ inertia
-    bent = across.transpose(0, 2, 1) @ inertia @ across
+    bent = turned.transpose(0, 2, 1) @ inertia @ across
     stiff = back @ (flow[:, n:, :n] @ basis + flow[:, n:, n:] @ across) + bent
     damped = back @ flow[:, n:, n:] @ basis
-    none, one = np.zeros_like(stiff), np.broadcast_to(np.eye(n - held), stiff.shape)
-    return np.concatenate([np.concatenate([none, one], 2), np.concatenate([stiff, damped], 2)], 1)
+    slid, one = back @ moving, np.broadcast_to(np.eye(n - held), stiff.shape)
+    return np.concatenate([np.concatenate([slid, one], 2), np.concatenate([stiff, damped], 2)], 1)

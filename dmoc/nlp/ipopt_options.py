@@ -97,7 +97,7 @@ def settings_for(
         pushed = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
         settings |= {"ipopt.warm_start_init_point": "yes", "ipopt.mu_init": 1e-6}
         settings |= {f"ipopt.warm_start_{name}": push for name in pushed}
-        if problem.inertia is not None and not carried:
+        if problem.turns and not carried:
             settings |= QUICK
     return settings
 

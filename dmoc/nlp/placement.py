@@ -70,8 +70,11 @@ class Placement:
         controls = self.steps if self.hold else nodes
         columns = columns.add("force", "control", actuator.labels(n), controls, sizes)
         if body.conditions:
-            # The force of the constraint on a quaternion is a torque per unit mass, that of a link a force.
-            reactions = np.repeat([units.torque, units.force], [body.surplus, body.joined])[None] / problem.mass
+            # The force of the constraint on a quaternion is a torque per unit mass; that of a link is a force
+            # unless it keeps an angle.
+            turns = np.array([unit == "rad" for link in body.link_units for unit in link], bool)
+            linked = np.where(turns, units.torque, units.force)
+            reactions = np.append(np.full(body.surplus, units.torque), linked)[None] / problem.mass
             labels = [str(i) for i in range(body.conditions)]
             columns = columns.add("reaction", "node", labels, nodes, reactions)
         if problem.actuator.burns:

@@ -13,10 +13,9 @@ from functools import partial
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.configurations.of_problem import configuration_of, link_sizes
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
@@ -213,13 +212,16 @@ class _Writer:
 
     def _links(self, draft: Draft, end: str, rows: Any) -> None:
         """Rows that keep the links together at a node or, of velocities, at one end; link by link."""
-        counts = np.cumsum([0, *link_sizes(self.problem)])
-        for i, link in enumerate(self.problem.links):
-            unit = (link.unit if link.unit == "m" else "") + "/s" * bool(end and link.unit == "m")
+        begin = 0
+        for i, (link, units) in enumerate(
+            zip(self.problem.links, self.dynamics.configuration.link_units, strict=True)
+        ):
+            known = [unit if unit in ("m", "rad") else "" for unit in units]
             mine = [
-                Row(str(k), rows[int(at)], 0.0, 0.0, unit)
-                for k, at in enumerate(range(counts[i], counts[i + 1]))
+                Row(str(k), rows[begin + k], 0.0, 0.0, unit and unit + "/s" * bool(end))
+                for k, unit in enumerate(known)
             ]
+            begin += len(units)
             name = f"{end}.{title(link, i)}" if end else title(link, i)
             draft.limit(name, "end" if end else "node", mine, Owner("links", i, end))
 

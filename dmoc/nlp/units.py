@@ -83,12 +83,12 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
 
     It is `without` [N m] where nothing turns.
     """
-    if problem.inertia is None:
+    if not problem.turns:
         return without
     turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)])
     used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
     scales = path_scales(guess)
-    moment, fastest = float(np.trace(problem.inertia)) / 3, max(scales.turn / guess.duration, scales.rate)
+    moment, fastest = problem.moment, max(scales.turn / guess.duration, scales.rate)
     typical = moment * fastest / guess.duration
     limit = problem.actuator.torque_limit()
     if limit is not None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.configurations.of_problem import link_sizes
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.plots.path import entries_once
 from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, PALE, readable, within_steps
 from dmoc.results.solution import Solution
@@ -83,9 +83,9 @@ def reaction_names(solution: Solution) -> list[str]:
     if problem is None:
         return [f"link equation {i + 1}" for i in range(forces.shape[1])]
     found = []
-    for link, count in zip(problem.links, link_sizes(problem), strict=True):
+    for link, units in zip(problem.links, configuration_of(problem).link_units, strict=True):
         name = type(link).__name__.lower() + f" of {link.holds[-1]}" * bool(link.holds[-1])
-        found += [name if count == 1 else f"{name}, {i + 1}" for i in range(count)]
+        found += [name if len(units) == 1 else f"{name}, {i + 1}" for i in range(len(units))]
     return found
 
 

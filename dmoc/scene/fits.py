@@ -7,52 +7,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import entries, number, short
+from dmoc.basics.arguments import short
 from dmoc.basics.quaternions import AXES, QUATERNION, rotation_of
+from dmoc.configurations.rigid import checked_inertia
 from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
+from dmoc.ends.each import Each
 from dmoc.parts.rows import Row
-
-
-def checked_inertia(value: Any) -> tuple[tuple[float, ...], ...]:
-    """An inertia in body axes [kg m^2] as a symmetric matrix: from three numbers or a matrix.
-
-    Raises
-    ------
-    ValueError
-        If it is no inertia of a body: not symmetric, not positive, or one principal moment above the sum of
-        the others.
-    """
-    given = entries(value)
-    rows = None if given is None else [entries(row) for row in given]
-    if given is None or len(given) != AXES or rows is None:
-        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
-    if all(row is None for row in rows):
-        moments = [number(f"inertia[{i}]", x, "kg m^2", positive=True) for i, x in enumerate(given)]
-        matrix = np.diag(moments)
-    elif all(row is not None and len(row) == AXES for row in rows):
-        matrix = np.array(
-            [
-                [number(f"inertia[{i}][{j}]", x, "kg m^2") for j, x in enumerate(row or ())]
-                for i, row in enumerate(rows)
-            ]
-        )
-    else:
-        raise ValueError(f"inertia must be three numbers or three rows of three [kg m^2]; got {short(value)}")
-    size = np.abs(matrix).max()
-    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
-        raise ValueError(f"inertia must be symmetric [kg m^2]; got {short(value)}")
-    small, middle, large = np.linalg.eigvalsh(matrix)
-    if small <= 0:
-        raise ValueError(f"inertia must have positive principal moments [kg m^2]; the smallest is {small:.3g}")
-    # A flat plate has equality; the rounding of numbers with nine digits is allowed for.
-    if large > (small + middle) * (1 + 1e-9):
-        raise ValueError(
-            f"no body has the principal moments {small:.4g}, {middle:.4g}, {large:.4g} kg m^2: none can be "
-            "more than the sum of the two others"
-        )
-    return tuple(tuple(float(x) for x in row) for row in 0.5 * (matrix + matrix.T))
 
 
 def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
@@ -64,6 +26,8 @@ def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, 
         If one is given without the other.
     """
     ends = {"start": start, "goal": goal}
+    if isinstance(start, Each) and isinstance(goal, Each):
+        return {"goal": goal.oriented(start)}
     if inertia is None:
         if any(end.turns_body for end in ends.values()):
             raise ValueError(

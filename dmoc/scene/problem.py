@@ -120,7 +120,7 @@ class TransferProblem:
             link.check_dimension(self.dimension)
         for part in parts:
             part.check_dimension(self.dimension)
-            check_acts_on(part, self.inertia is not None, self.start.has_position)
+            check_acts_on(part, self.turns, self.start.has_position)
         self._check_clock()
         check_functions(self)
         self._check_objective()
@@ -158,6 +158,17 @@ class TransferProblem:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
         # The stencils and the parameter vector of an NLP both follow this order.
         return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+
+    @property
+    def turns(self) -> bool:
+        """Whether a body turns: there is an attitude among the coordinates."""
+        return self.inertia is not None or (self.system is not None and self.system.turns)
+
+    @property
+    def moment(self) -> float:
+        """Mean principal moment of inertia of the body, or of the largest of several [kg m^2]; else 0."""
+        bodies = [self.inertia] if self.system is None else [one.inertia for one in self.system.bodies]
+        return max((float(np.trace(one)) / 3 for one in bodies if one is not None), default=0.0)
 
     @property
     def limited(self) -> bool:

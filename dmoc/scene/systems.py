@@ -8,9 +8,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, short
-from dmoc.effects.base import Body
+from dmoc.configurations.of_problem import free_configuration
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.each import each_of
+from dmoc.links.joint import Joint
 from dmoc.links.several import Several
 from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
@@ -40,12 +41,13 @@ def of_system(problem: Any) -> dict[str, Any]:
         raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
     if problem.constraints:
         raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
-    ends = {name: each_of(name, getattr(problem, name), system.names) for name in ("start", "goal")}
-    more = tuple(link for link in problem.links if link not in system.links)
+    given = entries(problem.links) or ()
+    links = (*system.links, *(link for link in given if link not in system.links))
+    ends = {name: each_of(name, getattr(problem, name), system, links) for name in ("start", "goal")}
     return {
         "system": system,
         "mass": system.mass,
-        "links": (*system.links, *more),
+        "links": links,
         "actuator": actuator,
         **ends,
     }
@@ -98,13 +100,10 @@ def check_links(problem: Any) -> None:
     """
     if not problem.links:
         return
-    if problem.inertia is not None:
-        raise ValueError("links hold bodies without an attitude so far; leave out the inertia, or the links")
-    n = len(problem.start.fixed()[0])
-    q, v = ca.SX.sym("q", n), ca.SX.sym("v", n)
     names = problem.system.names if problem.system is not None else ("",)
-    places = dict(zip(names, ca.vertsplit(q, problem.dimension), strict=True))
-    at = {name: Body(place, place) for name, place in places.items()}
+    body = free_configuration(problem)
+    q, v = ca.SX.sym("q", body.size), ca.SX.sym("v", body.freedom)
+    at = {name: one for name, one, _ in body.members(q, body.velocity(q, v), 1.0)}
     rows = []
     for i, link in enumerate(problem.links):
         if strangers := [name for name in link.holds if name not in names]:
@@ -115,35 +114,42 @@ def check_links(problem: Any) -> None:
         if not ca.depends_on(ca.SX(g), q):
             raise ValueError(f"{words} does not depend on the position; it must be zero where the link holds")
         rows.append(ca.vec(ca.SX(g)))
+        for field in (*link.holds,) if isinstance(link, Joint) else ():
+            if at[field].rotation is None:
+                raise ValueError(
+                    f"{type(link).__name__} (link {i + 1}) joins {field or 'a body'}, a point mass; give it "
+                    "an inertia [kg m^2], or use a Rod"
+                )
     for name in ("start", "goal"):
         position, velocity = getattr(problem, name).fixed()
         for i, (link, g) in enumerate(zip(problem.links, rows, strict=True)):
             _check_end(
-                f"{name} breaks {type(link).__name__} (link {i + 1})", link, (q, v, g), position, velocity
+                f"{name} breaks {type(link).__name__} (link {i + 1})",
+                link,
+                (q, v, g, ca.jtimes(g, q, body.velocity(q, v))),
+                (position, velocity),
             )
         if not np.isnan(position).any():
-            _check_rank(
-                problem, name, ca.Function("slopes", [q], [ca.jacobian(ca.vertcat(*rows), q)])(position)
-            )
+            slopes = ca.jacobian(ca.vertcat(*rows), q) @ body.tangent(q)
+            _check_rank(problem, name, ca.Function("slopes", [q], [slopes])(position))
 
 
-def _check_end(words: str, link: Any, symbols: tuple, position: np.ndarray, velocity: np.ndarray) -> None:
-    q, v, g = symbols
+def _check_end(words: str, link: Any, symbols: tuple, state: tuple[np.ndarray, np.ndarray]) -> None:
+    (q, v, g, opening), (position, velocity) = symbols, state
     # NaN marks what is free: what depends on it is not known.
-    state = np.nan_to_num(position), np.nan_to_num(velocity)
+    known = np.nan_to_num(position), np.nan_to_num(velocity)
     looks = [i for i in range(len(position)) if ca.depends_on(g, q[i])]
     if np.isnan(position[looks]).any():
         return
     size = max(float(np.abs(position[looks]).max(initial=0.0)), 1e-300)
-    gap = float(ca.norm_inf(ca.Function("gap", [q], [ca.densify(g)])(state[0])))
+    gap = float(ca.norm_inf(ca.Function("gap", [q], [ca.densify(g)])(known[0])))
     if gap > END_GAP * max(size, 1.0 if link.unit != "m" else size):
         unit = link.unit if link.unit != "-" else ""
         raise ValueError(f"{words} by {gap:.3g} {unit}".rstrip() + "; move the end or the link")
-    opening = ca.jtimes(g, q, v)
     moves = [i for i in range(len(velocity)) if ca.depends_on(opening, v[i])]
     if np.isnan(velocity[moves]).any():
         return
-    rate = float(ca.norm_inf(ca.Function("rate", [q, v], [ca.densify(opening)])(*state)))
+    rate = float(ca.norm_inf(ca.Function("rate", [q, v], [ca.densify(opening)])(*known)))
     speed = float(np.linalg.norm(np.nan_to_num(velocity)))
     if rate > END_GAP * max(speed, 1e-300):
         unit = "m/s" if link.unit == "m" else "1/s"

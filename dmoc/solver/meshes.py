@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ def first_path(
     mesh: Any = None,
 ) -> DiscretePath:
     """The guess on the last mesh; order and steps that are not given are those that the motion needs."""
-    if (problem.inertia is not None or problem.links) and not hold:
+    if (problem.turns or problem.links) and not hold:
         order = order or ORDER_OF_TURNING
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
     first = guess_on(problem, ends, order or 2, hold, guess)
@@ -257,3 +258,14 @@ def with_as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:
     steps = max(8, (len(path.mesh) - 1) * path.order // order)
     places = np.linspace(0.0, 1.0, len(path.mesh))
     return path.mesh if order == path.order else np.interp(np.linspace(0.0, 1.0, steps + 1), places, path.mesh)
+
+
+def followed(problem: TransferProblem, given: Any) -> TransferProblem:
+    """The problem whose goal has the sign of its quaternion to which a former path leads."""
+    path = getattr(given, "path", given)
+    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
+        return problem
+    ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
+    signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
+    # NaN, where an end leaves its attitude open, is not less than 0.
+    return replace(problem, goal=problem.goal.the_other_way()) if signs[0] * signs[1] < 0 else problem

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
-from dmoc.guess.starting import followed
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
@@ -14,7 +13,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
-from dmoc.solver.meshes import first_path
+from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.starts import compared

@@ -13,7 +13,7 @@ from dmoc.basics.quaternions import times, turned_by
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import windings_between
 from dmoc.guess.past_zones import ways_past
-from dmoc.guess.starting import angle_around, followed, starting_guess
+from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import path_scales
 from dmoc.nlp.transcription import check_mesh
@@ -21,7 +21,14 @@ from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import is_flyable
-from dmoc.solver.meshes import COARSEST_NODES, WIDEST_ROUNDING, coarse_to_fine, first_path, least_steps
+from dmoc.solver.meshes import (
+    COARSEST_NODES,
+    WIDEST_ROUNDING,
+    coarse_to_fine,
+    first_path,
+    followed,
+    least_steps,
+)
 
 # Two answers can be one optimum only if the relative difference of their objectives is at most this [-].
 SAME_OBJECTIVE = 1e-4
