@@ -20,6 +20,9 @@ ATTITUDE = "attitude"
 WHEELS = "wheels"
 
 
+QUATERNION_NAMES = ("qs", "qx", "qy", "qz")
+
+
 class Block(NamedTuple):
     """A part of q: its kind, how many entries it has, and the body of a system that it belongs to."""
 
@@ -104,6 +107,13 @@ class Coordinates:
             for block in self.blocks
             if block.kind == PLACE
             for axis in "xyz"[: block.size]
+        ]
+
+    @property
+    def attitude_labels(self) -> list[str]:
+        """A name for each entry of the attitudes of the bodies of a system."""
+        return [
+            f"{one.body}.{name}" for one in self.blocks if one.kind == ATTITUDE for name in QUATERNION_NAMES
         ]
 
     def of_body(self, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.quaternions import QUATERNION
 from dmoc.exports.functions import Scene
 from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.motion.mesh import node_fractions
@@ -71,8 +72,8 @@ def residual_of(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
         gaps = ca.Function("gaps", [q], [ca.densify(body.links_at(q))])
         found["residual_links"] = gaps.map(scene.nodes)(scene.joined(path, "places"))
     if scene.turns:
-        q = path[ATTITUDE.places]
-        found["residual_norm"] = ca.sum1(q * q) - 1
+        norms = [ca.sum1(q * q) - 1 for q in _attitudes(path)]
+        found["residual_norm"] = norms[0] if len(norms) == 1 else ca.vertcat(*norms)
     return found
 
 
@@ -167,7 +168,7 @@ def velocities_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
 
 def largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
     """The largest angle between neighbouring nodes of a body that turns, or of a link."""
-    body = scene.dynamics.configuration
+    body, turns = scene.dynamics.configuration, []
     if body.joined:
         bars = scene.dynamics.bars.map(scene.nodes)(scene.joined(path, "places"))
         cosine: Any = 1
@@ -175,9 +176,13 @@ def largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:
             ways = ca.reshape(bars[row, :].T, body.freedom, scene.nodes)
             ways = ways / ca.repmat(ca.sqrt(ca.sum1(ways * ways)), body.freedom, 1)
             cosine = ca.fmin(cosine, ca.mmin(ca.sum1(ways[:, 1:] * ways[:, :-1])))
-        return {"largest_turn": ca.acos(ca.fmax(cosine, -1))}
-    if not scene.turns:
-        return {}
-    q = path[ATTITUDE.places]
-    cosines = ca.sum1(q[:, 1:] * q[:, :-1])
-    return {"largest_turn": 2 * ca.acos(ca.fmax(ca.fmin(ca.mmin(cosines), 1), -1))}
+        turns.append(ca.acos(ca.fmax(cosine, -1)))
+    for q in _attitudes(path) if scene.turns else []:
+        cosines = ca.sum1(q[:, 1:] * q[:, :-1])
+        turns.append(2 * ca.acos(ca.fmax(ca.fmin(ca.mmin(cosines), 1), -1)))
+    return {"largest_turn": turns[0] if len(turns) == 1 else ca.mmax(ca.vertcat(*turns))} if turns else {}
+
+
+def _attitudes(path: dict[str, ca.MX]) -> list[ca.MX]:
+    """The quaternions of each body that turns, one column a node."""
+    return ca.vertsplit(path[ATTITUDE.places], QUATERNION)

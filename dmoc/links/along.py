@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.quaternions import slerp
+from dmoc.basics.quaternions import AXES, slerp
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.configurations.of_problem import configuration_of
@@ -93,12 +93,16 @@ def _step_by_step(on: _OnLinks, start: np.ndarray, aim: np.ndarray, fractions: n
 
 
 def states_of(body: Configuration, path: np.ndarray) -> dict[str, Body]:
-    """Places and attitudes of each body by its name, from coordinates of shape (count, size)."""
+    """Each body by its name, at rest, from coordinates of shape (count, size)."""
     found: dict[str, dict[str, np.ndarray]] = {}
     for block, part in zip(body.coordinates.blocks, body.coordinates.cut(path), strict=True):
         kind = "attitude" if block.kind == ATTITUDE else "position"
         found.setdefault(block.body, {})[kind] = part
-    return {name: Body(parts["position"], None, parts.get("attitude")) for name, parts in found.items()}
+    still = np.zeros((len(path), AXES))
+    return {
+        name: Body(parts["position"], 0 * parts["position"], parts.get("attitude"), None, still)
+        for name, parts in found.items()
+    }
 
 
 def coordinates_of(body: Configuration, at: dict[str, Body]) -> np.ndarray:

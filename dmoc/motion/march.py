@@ -118,8 +118,9 @@ def simulate(
     energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
     made = dynamics.configuration.coordinates
     trajectory = Trajectory(time, q[:, made.places], v[:, made.speeds], p[:, made.speeds], mass, energy)
-    for at in made.quaternions:
-        turned = {"attitude": q[:, at], "rate": v[:, made.rates], "spin": p[:, made.rates]}
+    if made.turns:
+        attitude = np.hstack([q[:, at] for at in made.quaternions])
+        turned = {"attitude": attitude, "rate": v[:, made.rates], "spin": p[:, made.rates]}
         trajectory = replace(trajectory, **turned)
     return replace(trajectory, wheel_momentum=v[:, made.spins]) if made.spins.any() else trajectory
 

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.quaternions import normalised
 from dmoc.configurations.of_problem import configuration_of
+from dmoc.links.along import states_of
+from dmoc.links.joint import Joint, room
 from dmoc.plots.path import entries_once
 from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, PALE, readable, within_steps
 from dmoc.results.solution import Solution
@@ -15,13 +18,15 @@ from dmoc.results.solution import Solution
 TIMES = 9
 # A picture is wider than the paths in it by this part of their extent.
 MARGIN = 0.08
+# Of more reactions than this the magnitudes are drawn, one curve a link.
+MOST_CURVES = 4
 
 
 def draw_bodies(axes: Any, solution: Solution) -> None:
     """The path of each body, and the links at even times, darker as time goes by."""
     made = solution.path.coordinates
     bodies = list(dict.fromkeys(block.body for block in made.blocks))
-    fine = within_steps(solution, solution.path.position)[1]
+    fine = _fine(solution)[1]
     size, unit = readable(np.ptp(solution.position, axis=0), "m")
     paths = {body: fine[:, made.of_body(body)[0] & made.places] / size for body in bodies}
     for i, (body, path) in enumerate(paths.items()):
@@ -30,12 +35,12 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
         for place, marker, name in ((0, "o", "start"), (-1, "*", "goal")):
             style = {"markersize": 8 if marker == "o" else 13, "markerfacecolor": "white", "zorder": 6}
             axes.plot(*path[place, :, None], marker, markeredgecolor=colour, label=name, **style)
-    _draw_links(axes, solution, paths, size)
+    shown = _draw_links(axes, solution, fine, size)
     if solution.dimension == 2:
         axes.set_aspect("equal")
         axes.margins(MARGIN)
     else:
-        axes.set_box_aspect(np.ptp(np.vstack(list(paths.values())), axis=0) + 1e-9)
+        _set_box(axes, np.vstack([*paths.values(), *shown]))
         axes.set_zlabel(f"z [{unit}]")
     axes.set_xlabel(f"x [{unit}]")
     axes.set_ylabel(f"y [{unit}]")
@@ -45,29 +50,104 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
     axes.legend(handles, labels, ncol=4, loc="upper center", bbox_to_anchor=(0.5, below))
 
 
-def _draw_links(axes: Any, solution: Solution, paths: dict[str, np.ndarray], size: float) -> None:
+def _fine(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and coordinates close enough to draw; attitudes are unit quaternions."""
+    times, fine = within_steps(solution, solution.path.position)
+    fine = fine.copy()
+    for at in solution.path.coordinates.quaternions:
+        fine[:, at] = normalised(fine[:, at])
+    return times, fine
+
+
+def _draw_links(axes: Any, solution: Solution, fine: np.ndarray, size: float) -> list[np.ndarray]:
     """The links of the problem, if it is there: what they draw of themselves at some of the times."""
-    count = len(next(iter(paths.values())))
-    few = np.linspace(0, count - 1, TIMES).astype(int)
-    places = {body: path[few] * size for body, path in paths.items()}
-    for link in solution.problem.links if solution.problem else ():
-        for line in link.lines(places):
+    if solution.problem is None:
+        return []
+    few = np.linspace(0, len(fine) - 1, TIMES).astype(int)
+    at, drawn = states_of(configuration_of(solution.problem), fine[few]), []
+    for link in solution.problem.links:
+        for line in link.lines(at):
             for i, piece in enumerate(line):
                 shade = 0.15 + 0.85 * i / max(len(line) - 1, 1)
                 axes.plot(*(piece / size).T, color=DARK, alpha=shade, linewidth=1.4, label="links", zorder=2)
+                drawn.append(piece / size)
+    return drawn
 
 
-def draw_reactions(axes: Any, solution: Solution, late: float) -> None:
-    """The forces of the links at the nodes."""
+def _set_box(axes: Any, points: np.ndarray) -> None:
+    """Equal scales in space, in a box that is nowhere thinner than a fifth of its longest side."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, side = 0.5 * (low + high), (high - low) * (1 + MARGIN)
+    side = np.maximum(side, 0.2 * side.max())
+    axes.set(
+        **{f"{axis}lim": (middle[i] - side[i] / 2, middle[i] + side[i] / 2) for i, axis in enumerate("xyz")}
+    )
+    axes.set_box_aspect(side)
+
+
+def joint_units(solution: Solution) -> list[str]:
+    """The units of the joints that one number says where they are."""
+    joints = _joints(solution)
+    return list(dict.fromkeys(joint.coordinate_units[0] for joint in joints))
+
+
+def _joints(solution: Solution) -> list[Joint]:
+    links = solution.problem.links if solution.problem else ()
+    return [link for link in links if isinstance(link, Joint) and link.coordinates == 1]
+
+
+def draw_joints(axes: Any, solution: Solution, late: float, unit: str) -> None:
+    """The angles of hinges or the ways of slides, and their limits."""
+    times, fine = _fine(solution)
+    at = states_of(configuration_of(solution.require_problem()), fine)
+    ours = [joint for joint in _joints(solution) if joint.coordinate_units[0] == unit]
+    values = [
+        joint.measured(at[joint.to] if joint.to else room(len(times)), at[joint.on])[:, 0] for joint in ours
+    ]
+    size, shown = (np.pi / 180, "degrees") if unit == "rad" else readable(np.array(values), unit)
+    for i, (joint, value) in enumerate(zip(ours, values, strict=True)):
+        axes.plot(times / late, value / size, label=joint.name, **_look(i))
+    kind = "angle" if unit == "rad" else "way"
+    axes.set_ylabel(f"{kind} [{shown}]")
+    axes.set_title("Angles of the hinges" if unit == "rad" else "Ways of the slides")
+
+
+def reaction_units(solution: Solution) -> list[str]:
+    """The units of what links exert: forces, and torques of those that keep an angle."""
+    return list(dict.fromkeys(_reaction_units(solution)))
+
+
+def _reaction_units(solution: Solution) -> list[str]:
     forces = solution.reaction
     assert forces is not None
-    size, unit = readable(forces, "N")
-    names = reaction_names(solution)
-    for i, (name, force) in enumerate(zip(names, forces.T, strict=True)):
+    if solution.problem is None:
+        return ["N"] * forces.shape[1]
+    units = [unit for link in configuration_of(solution.problem).link_units for unit in link]
+    return ["N m" if unit == "rad" else "N" for unit in units]
+
+
+def draw_reactions(axes: Any, solution: Solution, late: float, unit: str = "N") -> None:
+    """The forces, or the torques, of the links at the nodes; of more than a few the magnitude of each link."""
+    forces = solution.reaction
+    assert forces is not None
+    ours = [i for i, one in enumerate(_reaction_units(solution)) if one == unit]
+    names, values = reaction_names(solution), forces
+    curves = {names[i]: values[:, i] for i in ours}
+    if len(curves) > MOST_CURVES:
+        owners = [names[i].partition(",")[0] for i in ours]
+        curves = {
+            owner: np.linalg.norm(
+                values[:, [i for i, mine in zip(ours, owners, strict=True) if mine == owner]], axis=1
+            )
+            for owner in dict.fromkeys(owners)
+        }
+    size, shown = readable(np.array(list(curves.values())), unit)
+    for i, (name, force) in enumerate(curves.items()):
         axes.plot(solution.time / late, force / size, label=name, **_look(i))
     axes.axhline(0.0, color=PALE, linewidth=0.8)
-    axes.set_ylabel(f"force [{unit}]")
-    axes.set_title("Forces of the links")
+    kind = "force" if unit == "N" else "torque"
+    axes.set_ylabel(f"{kind} [{shown}]")
+    axes.set_title(f"{kind.capitalize()}s of the links")
 
 
 def _look(index: int) -> dict[str, Any]:

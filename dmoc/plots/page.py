@@ -12,7 +12,14 @@ from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import as_path, whole_file
 from dmoc.parts.objectives import Objective
 from dmoc.plots.ledger import draw_ledger
-from dmoc.plots.linked import draw_bodies, draw_reactions, draw_speeds
+from dmoc.plots.linked import (
+    draw_bodies,
+    draw_joints,
+    draw_reactions,
+    draw_speeds,
+    joint_units,
+    reaction_units,
+)
 from dmoc.plots.path import burning, draw_path, entries_once, is_wide
 from dmoc.plots.style import (
     AXIS_COLOURS,
@@ -95,7 +102,7 @@ def figure(solution: Solution, report: Report | None = None) -> Figure:
         turns = bool(solution.path.attitudes)
         held = solution.reaction is not None
         wide = not held and is_wide(solution)
-        drawn = _turning_panels(solution) if turns else _linked_panels(solution) if held else PANELS
+        drawn = _linked_panels(solution) if held else _turning_panels(solution) if turns else PANELS
         path, panels = _panels(page, 3 if turns else solution.dimension, wide, len(drawn))
         left = draw_bodies if held else draw_path if solution.dimension else draw_sphere
         left(path, solution, **({"beside": True} if wide else {}))
@@ -127,9 +134,11 @@ def _turning_panels(solution: Solution) -> list[Any]:
 
 
 def _linked_panels(solution: Solution) -> list[Any]:
-    """What is drawn over time of bodies that links hold: controls, speeds and the forces of the links."""
+    """What is drawn over time of linked bodies: controls, joints or speeds, and what the links exert."""
     controls = [partial(draw_controls, panel=panel) for panel in control_panels(solution)]
-    return [*controls, draw_speeds, draw_reactions]
+    joints: list[Any] = [partial(draw_joints, unit=unit) for unit in joint_units(solution)]
+    exerted = [partial(draw_reactions, unit=unit) for unit in reaction_units(solution)]
+    return [*controls, *(joints or [draw_speeds]), *exerted]
 
 
 def _panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[Any, list[Any]]:

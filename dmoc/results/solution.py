@@ -158,7 +158,7 @@ class Solution:
 
     @property
     def attitude(self) -> np.ndarray | None:
-        return self.path.attitudes[0] if self.path.attitudes else None
+        return np.hstack(self.path.attitudes) if self.path.attitudes else None
 
     @property
     def final_mass(self) -> float:
@@ -229,7 +229,7 @@ class Solution:
         axes = problem.dimension if problem.start.has_position else 0
         facts = (
             ("dimension", self.dimension, axes, ""),
-            ("number of attitudes", len(self.path.attitudes), 0 if problem.inertia is None else 1, ""),
+            ("number of attitudes", len(self.path.attitudes), len(problem.inertias), ""),
             ("number of controls", self.path.control.shape[1], problem.controls, ""),
             ("start time", self.provenance.start_time, problem.start_time, " s"),
         )

@@ -97,6 +97,8 @@ def _variables(solution: Any) -> Table:
         for name, (dims, values, unit, words) in table.items()
     }
     labels = {"axis": list(path.coordinates.place_labels), "channel": list(about.control_labels)}
+    if path.coordinates.turns and path.coordinates.blocks[0].body:
+        labels["quaternion"] = path.coordinates.attitude_labels
     coordinates = {name: ((name,), np.array(values, object), {"units": "1"}) for name, values in labels.items()}
     return variables | _multipliers(solution) | coordinates
 

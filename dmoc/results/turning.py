@@ -65,12 +65,11 @@ def turning_path(table: Table) -> tuple[Coordinates | None, np.ndarray, np.ndarr
     """What coordinates in a file are made of (None: of a place), they, and the velocities at both ends."""
     if "attitude" not in table:
         position, start, goal = (as_array(table, name) for name in NAMES[PLACE])
-        bodies = Counter(str(label).rpartition(".")[0] for label in table["axis"][1])
-        several = Coordinates(tuple(Block(PLACE, axes, body) for body, axes in bodies.items()))
-        return several if any(bodies) else None, position, start, goal
+        return _several(table), position, start, goal
     wheels = as_array(table, "wheel_integral").shape[1] if "wheel_integral" in table else 0
-    made = Coordinates.of_rigid_body(as_array(table, "position").shape[1], wheels)
-    kinds = [block.kind for block in made.blocks]
+    made = _several(table) or Coordinates.of_rigid_body(as_array(table, "position").shape[1], wheels)
+    # A variable holds the blocks of its kind for all bodies.
+    kinds = dict.fromkeys(block.kind for block in made.blocks)
     position, start, goal = (
         np.concatenate([as_array(table, NAMES[kind][which]) for kind in kinds], axis=-1)
         for which in range(len(NAMES[PLACE]))
@@ -78,16 +77,27 @@ def turning_path(table: Table) -> tuple[Coordinates | None, np.ndarray, np.ndarr
     return made, position, start, goal
 
 
+def _several(table: Table) -> Coordinates | None:
+    """Of what the coordinates of several bodies are made, by their labels; None for a body without a name."""
+    blocks = []
+    for dimension, kind in (("axis", PLACE), ("quaternion", ATTITUDE)):
+        labels = table[dimension][1] if dimension in table else ()
+        bodies = Counter(str(label).rpartition(".")[0] for label in labels)
+        blocks += [Block(kind, count, body) for body, count in bodies.items()]
+    return Coordinates(tuple(blocks)) if any(block.body for block in blocks) else None
+
+
 def turning_shapes(solution: Any, nodes: int, controls: int) -> dict[str, tuple]:
     """Arrays and the shapes that they must have."""
     path, ends = solution.path, solution.steps + 1
     if not path.attitudes:
         return {}
+    turning = len(path.attitudes)
     found = {
-        "rate": (solution.rate, (ends, AXES)),
-        "spin": (solution.spin, (ends, AXES)),
-        "torque": (solution.torque, (controls, AXES)),
-        "attitude": (path.attitudes[0], (nodes, QUATERNION)),
+        "rate": (solution.rate, (ends, AXES * turning)),
+        "spin": (solution.spin, (ends, AXES * turning)),
+        "torque": (solution.torque, (controls, AXES * turning)),
+        "attitude": (solution.attitude, (nodes, QUATERNION * turning)),
     }
     if wheels := int(path.coordinates.spins.sum()):
         found["wheel_momentum"] = (solution.wheel_momentum, (ends, wheels))

@@ -160,15 +160,20 @@ class TransferProblem:
         return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
 
     @property
+    def inertias(self) -> list[Any]:
+        """The inertia of each body that turns [kg m^2]."""
+        each = [self.inertia] if self.system is None else [body.inertia for body in self.system.bodies]
+        return [inertia for inertia in each if inertia is not None]
+
+    @property
     def turns(self) -> bool:
         """Whether a body turns: there is an attitude among the coordinates."""
-        return self.inertia is not None or (self.system is not None and self.system.turns)
+        return bool(self.inertias)
 
     @property
     def moment(self) -> float:
-        """Mean principal moment of inertia of the body, or of the largest of several [kg m^2]; else 0."""
-        bodies = [self.inertia] if self.system is None else [one.inertia for one in self.system.bodies]
-        return max((float(np.trace(one)) / 3 for one in bodies if one is not None), default=0.0)
+        """Mean principal moment of inertia of the body, or the largest of several [kg m^2]; 0 if none turns."""
+        return max((float(np.trace(inertia)) / 3 for inertia in self.inertias), default=0.0)
 
     @property
     def limited(self) -> bool:
