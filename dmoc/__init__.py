@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from dmoc.exports.export import export as export
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.joint import Joint as Joint
+    from dmoc.links.joint_limits import JointLimit as JointLimit
     from dmoc.links.joints import Fixed as Fixed
     from dmoc.links.joints import Prismatic as Prismatic
     from dmoc.links.joints import Revolute as Revolute
@@ -83,6 +84,8 @@ if TYPE_CHECKING:
     from dmoc.links.rods import Slider as Slider
     from dmoc.links.rods import Surface as Surface
     from dmoc.links.several import Several as Several
+    from dmoc.links.springs import JointDamper as JointDamper
+    from dmoc.links.springs import JointSpring as JointSpring
     from dmoc.links.system import Member as Member
     from dmoc.links.system import System as System
     from dmoc.motion.march import Trajectory as Trajectory

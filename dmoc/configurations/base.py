@@ -163,6 +163,10 @@ class Configuration(ABC):
         """Name, state and mass of each body; the name of an only body is empty."""
         return [("", self.body(q, v, m), m)]
 
+    def at(self, q: Any, v: Any, m: Any) -> dict[str, Body]:
+        """The bodies by their names."""
+        return {name: body for name, body, _ in self.members(q, v, m)}
+
     def on(self, name: str, q: Any, force: Any, torque: Any) -> Any:
         """The column of the size of q by which a force [N] and a torque in body axes [N m] act on one body."""
         return self.generalised(q, force, torque)

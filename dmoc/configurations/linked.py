@@ -72,7 +72,7 @@ class Linked(Configuration):
     def _equations(self) -> tuple[ca.SX, list[ca.SX]]:
         """Coordinates, and g of each link at them."""
         q = ca.SX.sym("q", self.size)
-        at = {name: body for name, body, _ in self.free.members(q, ca.SX.zeros(self.size), 1.0)}
+        at = self.free.at(q, ca.SX.zeros(self.size), 1.0)
         return q, [ca.vec(ca.SX(link.g_of(at))) for link in self.links]
 
     @cached_property

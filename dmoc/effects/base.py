@@ -7,6 +7,7 @@ dimension) and `m` the mass [kg]. Constants of an effect are baked into the grap
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -194,6 +195,26 @@ class BodyForce(Effect):
 
     def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         return self.wrench(t, body, m)
+
+
+class Between(Effect):
+    """An effect between bodies of a system, or between a body and the room.
+
+    Whoever implements one gives an `energy`, or with `acts` what it does where it does work.
+    """
+
+    @property
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies on which it acts."""
+
+    def energy(self, t: Any, at: Mapping[str, Body]) -> Any:
+        """Its potential energy [J], for bodies by name; None where it does work instead."""
+        return None
+
+    def acts(self, configuration: Any, t: Any, q: Any, at: Mapping[str, Body]) -> Any:
+        """The column of the size of q by which it acts; None where it has an energy."""
+        return None
 
 
 def _in_words(value: Any, unit: str) -> str:

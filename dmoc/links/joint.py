@@ -110,6 +110,10 @@ class Joint(Holonomic):
         """The rate of its coordinate, or the turning of what it carries [rad/s], [m/s]."""
         raise ValueError(f"{type(self).__name__} does not move")
 
+    def from_rest(self, at: Mapping[str, Body], rest: float) -> Any:
+        """How far it is from where a spring in it is at rest [rad], [m]."""
+        return self.coordinate(at) - rest
+
     def off(self, at: Mapping[str, Body], value: Any) -> Any:
         """By how much its coordinate is off a value: entries that are zero there and have slopes."""
         return self.coordinate(at) - value

@@ -81,7 +81,7 @@ class JointTorque(Actuator):
         return ca.dot(u, u)
 
     def acts(self, configuration: Any, q: Any, u: Any) -> Any:
-        at = {name: body for name, body, _ in configuration.members(q, ca.SX.zeros(configuration.size), 1.0)}
+        at = configuration.at(q, ca.SX.zeros(configuration.size), 1.0)
         acts = self.joint.driven(configuration, q, at, u)
         return acts if self.against is None else acts - self.against.driven(configuration, q, at, u)
 
@@ -105,7 +105,8 @@ class JointTorque(Actuator):
 
     def needs(self, eased: Actuator) -> str:
         enough = up(eased.main_limit() or 0.0)
-        return f"a joint {self.word} of {enough} {self.unit} (you gave {self.limit:g} {self.unit})"
+        where = f" in the joint of {self.joint.name}" if self.joint.on else ""
+        return f"a joint {self.word} of {enough} {self.unit}{where} (you gave {self.limit:g} {self.unit})"
 
     def unlimited(self) -> Actuator:
         return replace(self, limit=None)
@@ -224,8 +225,7 @@ class On(Actuator):
 
     def acts(self, configuration: Any, q: Any, u: Any) -> Any:
         if self.push.turns_body:
-            members = configuration.members(q, ca.SX.zeros(configuration.size), 1.0)
-            rotation = next(body.rotation for name, body, _ in members if name == self.body)
+            rotation = configuration.at(q, ca.SX.zeros(configuration.size), 1.0)[self.body].rotation
             return configuration.on(self.body, q, *self.push.wrench(rotation, u))
         whole, force = ca.SX.zeros(configuration.dimension), ca.SX(self.push.force(u))
         for i, axis in enumerate(self._axes(configuration.dimension)):

@@ -74,11 +74,14 @@ class Rod(Holonomic):
         """What its angle and its motor are called: by the body at its end."""
         return self.on
 
+    def from_rest(self, at: Mapping[str, Body], rest: float) -> Any:
+        """The angle from a direction in the plane [rad], less than 180 degrees to either side."""
+        arm, x, y = self.arm(at), np.cos(rest), np.sin(rest)
+        return ca.atan2(arm[1] * x - arm[0] * y, arm[0] * x + arm[1] * y)
+
     def off(self, at: Mapping[str, Body], value: Any) -> Any:
         """By how much its angle is off a value: twice the sine of half of it, which has no jumps."""
-        arm, (x, y) = self.arm(at), (np.cos(value), np.sin(value))
-        along, across = (arm[0] * x + arm[1] * y) / self.length, (arm[1] * x - arm[0] * y) / self.length
-        return 2 * ca.sin(0.5 * ca.atan2(across, along))
+        return 2 * ca.sin(0.5 * self.from_rest(at, value))
 
     def rate(self, at: Mapping[str, Body]) -> Any:
         """The rate of its angle [rad/s]."""
@@ -101,7 +104,7 @@ class Rod(Holonomic):
         """The column of the size of q by which a motor at its anchor acts, whose reaction is elsewhere."""
         # The torque works on the angle of the rod: its force on q is that angle's slope.
         place = ca.SX.sym("q", configuration.size)
-        arm = self.arm({name: body for name, body, _ in configuration.members(place, 0 * place, 1.0)})
+        arm = self.arm(configuration.at(place, 0 * place, 1.0))
         across = ca.vertcat(-arm[1], arm[0]) / ca.dot(arm, arm)
         slope = ca.jacobian(arm, place).T @ across
         return ca.Function("slope", [place], [slope])(q) * u

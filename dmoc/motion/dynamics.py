@@ -12,7 +12,7 @@ from dmoc.basics.memory import remembered_property
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.configurations.rigid import newton_euler
-from dmoc.effects.base import Effect
+from dmoc.effects.base import Between, Effect
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.forces import FreeForce
 
@@ -248,6 +248,9 @@ def specific_lagrangian(effects: Sequence[Effect], configuration: Configuration,
         terms = [effect.lagrangian_of(t, body, mass) for effect in effects]
         mine = sum((term for term in terms if term is not None), ca.SX(0))
         total = total + (mine if mass is m else mass / m * mine)
+    for effect in effects:
+        if isinstance(effect, Between) and effect.energy(t, at := configuration.at(q, v, m)) is not None:
+            total = total - effect.energy(t, at) / m
     return total
 
 
@@ -255,15 +258,17 @@ def point_function(
     effects: Sequence[Effect], configuration: Configuration, kinetic: bool = True
 ) -> ca.Function:
     """(t, q, v, m) -> dl/dq, dl/dv, F/m of these effects, with or without the kinetic energy."""
-    size = configuration.size
-    t, q, v, m = state_symbols(size)
+    t, q, v, m = state_symbols(configuration.size)
     lagrangian = specific_lagrangian(effects, configuration, t, q, v, m)
-    push = ca.SX.zeros(size)
+    push = ca.SX.zeros(configuration.size)
     for effect in effects:
         for name, body, mass in configuration.members(q, v, m):
             force, torque = effect.wrench_of(t, body, mass)
             if force is not None or torque is not None:
                 push = push + configuration.on(name, q, force, torque) / m
+        if isinstance(effect, Between):
+            acts = effect.acts(configuration, t, q, configuration.at(q, v, m))
+            push = push if acts is None else push + acts / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
     change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
     return ca.Function("point", [t, q, v, m], [*change, configuration.shared(push, m)])
@@ -286,6 +291,9 @@ def split_effects(
             for _, body, mass in members
             for act in (effect.lagrangian_of(t, body, mass), *effect.wrench_of(t, body, mass))
         ]
+        if isinstance(effect, Between):
+            at = configuration.at(q, v, m)
+            acts += [effect.energy(t, at), effect.acts(configuration, t, q, at)]
         return any(ca.depends_on(ca.SX(act), v) for act in acts if act is not None)
 
     known = [(looks_at_velocity(effect), effect) for effect in effects]

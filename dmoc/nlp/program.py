@@ -250,8 +250,7 @@ def _open(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
 def _looks_at(link: Any, dynamics: Dynamics, free: np.ndarray) -> bool:
     """Whether a link looks at a coordinate of a boundary position that is free."""
     q = ca.SX.sym("q", len(free))
-    members = dynamics.configuration.members(q, ca.SX.zeros(len(free)), 1.0)
-    g = ca.SX(link.g_of({name: body for name, body, _ in members}))
+    g = ca.SX(link.g_of(dynamics.configuration.at(q, ca.SX.zeros(len(free)), 1.0)))
     return any(ca.which_depends(g, q[i], 1, True)[0] for i in np.flatnonzero(free))
 
 

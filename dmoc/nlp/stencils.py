@@ -85,8 +85,9 @@ class _Writer:
             rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q))[: body.surplus])]
             draft.limit(CONSTRAINT, "node", rows)
         self._links(draft, "", body.links_at(q))
+        at = body.at(q, ca.DM.zeros(n), m)
         for i, constraint in enumerate(self.constraints):
-            rows = constraint.rows_of(t, body.body(q, ca.DM.zeros(n)), u, m)
+            rows = constraint.rows_at(t, at, u, m)
             draft.limit(title(constraint, i), "node", rows, Owner("constraints", i))
         if u is not None:
             draft.limit("actuator", "control", self.actuator.rows(u), Owner("actuator"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -82,6 +82,10 @@ class Constraint(ABC):
         """Rows that hold at the Gauss points of every step and at both ends."""
         return []
 
+    def rows_at(self, t: Any, at: Mapping[str, Body], u: Any, m: Any) -> list[Row]:
+        """Rows that hold at every node, of bodies by their names; of the only one by default."""
+        return self.rows_of(t, next(iter(at.values())), u, m)
+
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
         """Rows that hold at every node, of a body as effects see it: of its position, or of a point of it."""
         return self.rows(t, self._place_and_velocity(body)[0], u, m)
@@ -139,6 +143,11 @@ class Constraint(ABC):
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value, unit or "-"
+
+    @property
+    def limits_joint(self) -> bool:
+        """Whether it is a limit on where a joint is, which is seen in the coordinates of several bodies."""
+        return False
 
     @property
     def limits_speed(self) -> bool:

@@ -10,8 +10,9 @@ from dmoc.basics.quaternions import normalised
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.links.along import states_of
 from dmoc.links.joint import Joint, room
+from dmoc.links.joint_limits import JointLimit
 from dmoc.plots.path import entries_once
-from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, PALE, readable, within_steps
+from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, readable, within_steps
 from dmoc.results.solution import Solution
 
 # Links are drawn at this many times.
@@ -107,6 +108,11 @@ def draw_joints(axes: Any, solution: Solution, late: float, unit: str) -> None:
     size, shown = (np.pi / 180, "degrees") if unit == "rad" else readable(np.array(values), unit)
     for i, (joint, value) in enumerate(zip(ours, values, strict=True)):
         axes.plot(times / late, value / size, label=joint.name, **_look(i))
+    for limit in solution.require_problem().constraints:
+        if isinstance(limit, JointLimit) and limit.unit == unit:
+            for side in (limit.low, limit.high):
+                if side is not None:
+                    axes.axhline(side / size, label="limit", **LIMIT)
     kind = "angle" if unit == "rad" else "way"
     axes.set_ylabel(f"{kind} [{shown}]")
     axes.set_title("Angles of the hinges" if unit == "rad" else "Ways of the slides")

@@ -156,7 +156,8 @@ def turn_cuts(
     velocity : array, shape (nodes, freedom)
         Independent velocities at every node.
     """
-    ours = [(i, constraint) for i, constraint in enumerate(constraints) if constraint.turns_body]
+    yield from _joint_cuts(constraints, path)
+    ours = [(i, one) for i, one in enumerate(constraints) if one.turns_body and not one.limits_joint]
     if not ours:
         return
     rule, steps = scheme(path.order), len(path.mesh) - 1
@@ -185,6 +186,35 @@ def turn_cuts(
         )
         broken = np.flatnonzero(between.reshape(steps, -1).max(axis=1) > allowed)
         yield Cut(f"{name} between nodes", i, _most(between), allowed, unit, broken)
+
+
+def _joint_cuts(constraints: Sequence[Constraint], path: DiscretePath) -> Iterator[Cut]:
+    """Limits of joints at the nodes and between them.
+
+    Between two nodes a joint may pass its stop by an eighth of the second difference of its coordinate there,
+    and by no more than a hundredth of its way.
+    """
+    ours = [(i, constraint) for i, constraint in enumerate(constraints) if constraint.limits_joint]
+    if not ours:
+        return
+    rule, steps = scheme(path.order), len(path.mesh) - 1
+    places = np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]
+    found = np.einsum("pj,jkn->kpn", rule.values_at(places), path.position[step_nodes(steps, rule)])
+    inside = found.reshape(-1, found.shape[2])
+    for at in path.coordinates.quaternions:
+        inside[:, at] = normalised(inside[:, at])
+    for i, constraint in ours:
+        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
+        nodes, between = (constraint.seen(q, np.zeros_like(q))[0] for q in (path.position, inside))
+        way = float(np.ptp(nodes)) or 1.0
+        at_nodes = constraint.excess(nodes, nodes)
+        size = 1.0 if unit == "rad" else way
+        yield Cut(f"{name} at nodes", i, _most(at_nodes), BOUND * size, unit, np.empty(0, int))
+        bump = _most(np.abs(np.diff(nodes[:, 0], 2))) / 8
+        allowed = BOUND * size + min(bump, DEEPEST * way)
+        beyond = constraint.excess(between, between)
+        broken = np.flatnonzero(beyond.reshape(steps, -1).max(axis=1) > allowed)
+        yield Cut(f"{name} between nodes", i, _most(beyond), allowed, unit, broken)
 
 
 def _steps(path: DiscretePath, broken: np.ndarray) -> np.ndarray:

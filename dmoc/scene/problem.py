@@ -21,7 +21,7 @@ from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
-from dmoc.scene.systems import check_links, check_pushed, of_system
+from dmoc.scene.systems import check_links, check_pushed, limits_placed, of_system
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -122,6 +122,7 @@ class TransferProblem:
             part.check_dimension(self.dimension)
             check_acts_on(part, self.turns, self.start.has_position)
         self._check_clock()
+        checked(self, **limits_placed(self))
         check_functions(self)
         self._check_objective()
         self._check_ends()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +12,7 @@ from dmoc.basics.arguments import entries, short
 from dmoc.configurations.of_problem import free_configuration
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.each import each_of
+from dmoc.links.holonomic import Holonomic
 from dmoc.links.joint import Joint
 from dmoc.links.several import Several
 from dmoc.links.system import System
@@ -39,7 +41,7 @@ def of_system(problem: Any) -> dict[str, Any]:
         )
     if problem.inertia is not None:
         raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
-    if problem.constraints:
+    if any(not getattr(limit, "limits_joint", False) for limit in entries(problem.constraints) or ()):
         raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
     given = entries(problem.links) or ()
     links = (*system.links, *(link for link in given if link not in system.links))
@@ -51,6 +53,28 @@ def of_system(problem: Any) -> dict[str, Any]:
         "actuator": actuator,
         **ends,
     }
+
+
+def limits_placed(problem: Any) -> dict[str, Any]:
+    """The constraints of a problem, those on joints with the coordinates of all bodies.
+
+    Raises
+    ------
+    ValueError
+        If a limit, a spring or a damper sits in a joint that is none of the links.
+    """
+    for part in (*problem.effects, *problem.constraints):
+        joint = getattr(part, "joint", None)
+        if isinstance(joint, Holonomic) and joint not in problem.links:
+            raise ValueError(
+                f"{type(part).__name__} sits in a {type(joint).__name__} that is no link; list it there"
+            )
+    limits = [limit for limit in problem.constraints if limit.limits_joint]
+    if not limits:
+        return {}
+    body = free_configuration(problem)
+    placed = (replace(one, body=body) if one.limits_joint else one for one in problem.constraints)
+    return {"constraints": tuple(placed)}
 
 
 def check_pushed(problem: Any) -> None:
@@ -103,7 +127,7 @@ def check_links(problem: Any) -> None:
     names = problem.system.names if problem.system is not None else ("",)
     body = free_configuration(problem)
     q, v = ca.SX.sym("q", body.size), ca.SX.sym("v", body.freedom)
-    at = {name: one for name, one, _ in body.members(q, body.velocity(q, v), 1.0)}
+    at = body.at(q, body.velocity(q, v), 1.0)
     rows = []
     for i, link in enumerate(problem.links):
         if strangers := [name for name in link.holds if name not in names]:
