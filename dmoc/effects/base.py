@@ -102,6 +102,8 @@ class Effect(Part, ABC):
     turns_body: ClassVar[bool] = False
     # Whether it needs the position of the body.
     moves_body: ClassVar[bool] = True
+    # Whether it acts between bodies, and not on each by itself.
+    joins: ClassVar[bool] = False
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the effect has no meaning in this many dimensions."""
@@ -125,6 +127,14 @@ class Effect(Part, ABC):
     def wrench_of(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
         """Force in space axes [N] and torque about the centre of mass in body axes [N m]; None where 0."""
         return None, None
+
+    def energy_between(self, t: Any, at: Mapping[str, Body]) -> Any:
+        """Potential energy between bodies [J], by their names; None where there is none."""
+        return None
+
+    def acts_between(self, configuration: Any, t: Any, q: Any, at: Mapping[str, Body]) -> Any:
+        """The column of the size of q by which it acts between bodies; None where it has an energy."""
+        return None
 
 
 class Conservative(Effect):
@@ -200,21 +210,15 @@ class BodyForce(Effect):
 class Between(Effect):
     """An effect between bodies of a system, or between a body and the room.
 
-    Whoever implements one gives an `energy`, or with `acts` what it does where it does work.
+    Whoever implements one gives `energy_between`, or `acts_between` where it does work.
     """
+
+    joins: ClassVar[bool] = True
 
     @property
     @abstractmethod
     def bodies(self) -> tuple[str, ...]:
         """The names of the bodies on which it acts."""
-
-    def energy(self, t: Any, at: Mapping[str, Body]) -> Any:
-        """Its potential energy [J], for bodies by name; None where it does work instead."""
-        return None
-
-    def acts(self, configuration: Any, t: Any, q: Any, at: Mapping[str, Body]) -> Any:
-        """The column of the size of q by which it acts; None where it has an energy."""
-        return None
 
 
 def _in_words(value: Any, unit: str) -> str:

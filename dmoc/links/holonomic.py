@@ -29,6 +29,9 @@ class Holonomic(Part, ABC):
     # The unit of g: the force of the link is then per unit of it.
     unit: ClassVar[str] = "m"
 
+    # Whether a picture shows where it is, by one number.
+    shown: bool = False
+
     @abstractmethod
     def g(self, q: Any) -> Any:
         """What the link keeps at zero [`unit`], one entry or a column, for a CasADi position q [m].

@@ -74,6 +74,10 @@ class Joint(Holonomic):
         return (self.to, self.on) if self.to else (self.on,)
 
     @property
+    def shown(self) -> bool:  # type: ignore[override]
+        return self.coordinates == 1
+
+    @property
     def name(self) -> str:
         """What its coordinate and its motor are called: by the body that it carries."""
         return self.on or "joint"

@@ -60,6 +60,10 @@ class JointLimit(Constraint):
         return True
 
     @property
+    def stops(self) -> tuple[float, ...]:
+        return tuple(side for side in (self.low, self.high) if side is not None)
+
+    @property
     def structure(self) -> tuple:
         return type(self), self.joint, self.low, self.high
 

@@ -58,7 +58,7 @@ class JointSpring(_InJoint):
         )
         checked(self, rest=number("JointSpring: rest", self.rest, "rad or m"))
 
-    def energy(self, t: Any, at: Mapping[str, Body]) -> Any:
+    def energy_between(self, t: Any, at: Mapping[str, Body]) -> Any:
         return 0.5 * self.stiffness * self.joint.from_rest(at, self.rest) ** 2
 
     def words(self) -> str:
@@ -88,7 +88,7 @@ class JointDamper(_InJoint):
         self._check_joint()
         checked(self, damping=number("JointDamper: damping", self.damping, "N m s/rad or N s/m", positive=True))
 
-    def acts(self, configuration: Any, t: Any, q: Any, at: Mapping[str, Body]) -> Any:
+    def acts_between(self, configuration: Any, t: Any, q: Any, at: Mapping[str, Body]) -> Any:
         return self.joint.driven(configuration, q, at, -self.damping * self.joint.rate(at))
 
     def words(self) -> str:

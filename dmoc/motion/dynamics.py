@@ -12,7 +12,7 @@ from dmoc.basics.memory import remembered_property
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.configurations.rigid import newton_euler
-from dmoc.effects.base import Between, Effect
+from dmoc.effects.base import Effect
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.forces import FreeForce
 
@@ -249,8 +249,8 @@ def specific_lagrangian(effects: Sequence[Effect], configuration: Configuration,
         mine = sum((term for term in terms if term is not None), ca.SX(0))
         total = total + (mine if mass is m else mass / m * mine)
     for effect in effects:
-        if isinstance(effect, Between) and effect.energy(t, at := configuration.at(q, v, m)) is not None:
-            total = total - effect.energy(t, at) / m
+        if effect.joins and (energy := effect.energy_between(t, configuration.at(q, v, m))) is not None:
+            total = total - energy / m
     return total
 
 
@@ -266,8 +266,8 @@ def point_function(
             force, torque = effect.wrench_of(t, body, mass)
             if force is not None or torque is not None:
                 push = push + configuration.on(name, q, force, torque) / m
-        if isinstance(effect, Between):
-            acts = effect.acts(configuration, t, q, configuration.at(q, v, m))
+        if effect.joins:
+            acts = effect.acts_between(configuration, t, q, configuration.at(q, v, m))
             push = push if acts is None else push + acts / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
     change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
@@ -291,9 +291,9 @@ def split_effects(
             for _, body, mass in members
             for act in (effect.lagrangian_of(t, body, mass), *effect.wrench_of(t, body, mass))
         ]
-        if isinstance(effect, Between):
+        if effect.joins:
             at = configuration.at(q, v, m)
-            acts += [effect.energy(t, at), effect.acts(configuration, t, q, at)]
+            acts += [effect.energy_between(t, at), effect.acts_between(configuration, t, q, at)]
         return any(ca.depends_on(ca.SX(act), v) for act in acts if act is not None)
 
     known = [(looks_at_velocity(effect), effect) for effect in effects]

@@ -163,20 +163,20 @@ def _impulses(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
 def _between_links(dynamics: Dynamics, path: DiscretePath, slopes: np.ndarray) -> np.ndarray:
     """Slopes of a step's momenta in an orthonormal basis of the ways in which links let each node move."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
-    bases = link_bases(dynamics, path.position)[step_nodes(steps, rule)]
+    bases = link_bases(dynamics, path.position, path.mass[0])[step_nodes(steps, rule)]
     blocks = slopes.reshape(steps, rule.degree + 1, dynamics.freedom, rule.degree + 1, dynamics.freedom)
     found = np.einsum("ikna,kinjm,jkmb->kiajb", bases, blocks, bases, optimize=True)
     size = (rule.degree + 1) * bases.shape[-1]
     return found.reshape(steps, size, size)
 
 
-def link_bases(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
+def link_bases(dynamics: Dynamics, position: np.ndarray, mass: float) -> np.ndarray:
     """Bases of the velocities that links let be, shape (places, freedom, freedom - joined).
 
     They are orthonormal in the kinetic energy, B' M B = 1, so that velocities and momenta are of one size. Each
     is turned as little as can be from the one before, so that matrices from one to the next compare.
     """
-    held, root = dynamics.configuration.joined, inertia_root(dynamics, position[0])
+    held, root = dynamics.configuration.joined, inertia_root(dynamics, position[0], mass)
     bars = dynamics.bars(position.T).full().reshape(held, len(position), -1).transpose(1, 2, 0)
     bases = np.linalg.qr(np.linalg.solve(root, bars), mode="complete")[0][:, :, held:]
     for before, basis in pairwise(bases):
@@ -185,11 +185,11 @@ def link_bases(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
     return np.linalg.solve(root.T, bases)
 
 
-def inertia_root(dynamics: Dynamics, position: np.ndarray) -> np.ndarray:
+def inertia_root(dynamics: Dynamics, position: np.ndarray, mass: float) -> np.ndarray:
     """L with L L' = M, the inertia along the independent velocities per unit mass, the same everywhere."""
     t, q, w, m, _ = dynamics.states()
     inertia = ca.Function("inertia", [t, q, w, m], [ca.jacobian(dynamics.momentum(t, q, w, m), w)])
-    return np.linalg.cholesky(inertia(0.0, position, 0.0, 1.0).full())
+    return np.linalg.cholesky(inertia(0.0, position, 0.0, mass).full())
 
 
 def legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Function:
@@ -223,7 +223,7 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
 
 
 def flow_between_links(
-    dynamics: Dynamics, position: np.ndarray, velocity: np.ndarray, flow: np.ndarray
+    dynamics: Dynamics, position: np.ndarray, velocity: np.ndarray, mass: float, flow: np.ndarray
 ) -> np.ndarray:
     """The flow in the ways that links let be, in bases B that turn along with them as little as they must.
 
@@ -239,7 +239,7 @@ def flow_between_links(
     bending, bars = (
         part.full().reshape(held, len(position), n).transpose(1, 0, 2) for part in both(position.T, velocity.T)
     )
-    basis, root = link_bases(dynamics, position), inertia_root(dynamics, position[0])
+    basis, root = link_bases(dynamics, position, mass), inertia_root(dynamics, position[0], mass)
     inertia = root @ root.T
     light = np.linalg.solve(inertia, bars.transpose(0, 2, 1))
     moving = flow[:, :n, :n] @ basis

@@ -136,7 +136,7 @@ def _radius_of_flow(
     given = times[None], path.position.T, rates.T, path.mass[None], controls.T
     stacked = np.array(dynamics.linearised_under_thrust(*given))
     flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
-    flow = flow_between_links(dynamics, path.position, rates, flow)
+    flow = flow_between_links(dynamics, path.position, rates, path.mass[0], flow)
     one, whole = np.eye(flow.shape[1]), np.eye(flow.shape[1])
     for first, last in pairwise(at):
         part = ((times[last] - times[first]) / SQUARED)[:, None, None] * 0.5 * (flow[first] + flow[last])
@@ -176,7 +176,7 @@ def flow_matrices(
     stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
     flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
     if dynamics.configuration.joined:
-        flow = flow_between_links(dynamics, path.position[ends], velocity, flow)
+        flow = flow_between_links(dynamics, path.position[ends], velocity, path.mass[0], flow)
     return flow, constant
 
 

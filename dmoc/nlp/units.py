@@ -90,6 +90,9 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     scales = path_scales(guess)
     moment, fastest = problem.moment, max(scales.turn / guess.duration, scales.rate)
     typical = moment * fastest / guess.duration
+    if problem.links:
+        # What links hold up pulls on levers, also where nothing turns.
+        typical = max(typical, without)
     limit = problem.actuator.torque_limit()
     if limit is not None:
         used = min(max(used, LEAST_SHARE * limit), limit) if used else limit

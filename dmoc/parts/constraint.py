@@ -150,6 +150,11 @@ class Constraint(ABC):
         return False
 
     @property
+    def stops(self) -> tuple[float, ...]:
+        """The values at which a joint stops [`unit`]."""
+        return ()
+
+    @property
     def limits_speed(self) -> bool:
         """Whether it is a limit on the speed, which a longer duration eases."""
         return self.unit == "m/s"

@@ -9,8 +9,7 @@ import numpy as np
 from dmoc.basics.quaternions import normalised
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.links.along import states_of
-from dmoc.links.joint import Joint, room
-from dmoc.links.joint_limits import JointLimit
+from dmoc.links.joint import room
 from dmoc.plots.path import entries_once
 from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, readable, within_steps
 from dmoc.results.solution import Solution
@@ -92,9 +91,9 @@ def joint_units(solution: Solution) -> list[str]:
     return list(dict.fromkeys(joint.coordinate_units[0] for joint in joints))
 
 
-def _joints(solution: Solution) -> list[Joint]:
+def _joints(solution: Solution) -> list[Any]:
     links = solution.problem.links if solution.problem else ()
-    return [link for link in links if isinstance(link, Joint) and link.coordinates == 1]
+    return [link for link in links if link.shown]
 
 
 def draw_joints(axes: Any, solution: Solution, late: float, unit: str) -> None:
@@ -109,10 +108,8 @@ def draw_joints(axes: Any, solution: Solution, late: float, unit: str) -> None:
     for i, (joint, value) in enumerate(zip(ours, values, strict=True)):
         axes.plot(times / late, value / size, label=joint.name, **_look(i))
     for limit in solution.require_problem().constraints:
-        if isinstance(limit, JointLimit) and limit.unit == unit:
-            for side in (limit.low, limit.high):
-                if side is not None:
-                    axes.axhline(side / size, label="limit", **LIMIT)
+        for side in limit.stops if limit.unit == unit else ():
+            axes.axhline(side / size, label="limit", **LIMIT)
     kind = "angle" if unit == "rad" else "way"
     axes.set_ylabel(f"{kind} [{shown}]")
     axes.set_title("Angles of the hinges" if unit == "rad" else "Ways of the slides")
