@@ -110,7 +110,7 @@ class Boundary(ABC):
 
     @property
     def moves(self) -> bool:
-        """Whether its place is known, but only at a given time."""
+        """Whether its place or attitude is known, but only at a given time."""
         return self.anchored and bool(np.isnan(self.fixed()[0]).any())
 
     @abstractmethod

@@ -24,7 +24,8 @@ OF_TIME = "it must take a CasADi time [s] and give {} numbers: write it with cas
 class Moving(Boundary):
     """A state that moves along a known path: the body is there at the time the transfer starts or ends.
 
-    With an attitude it turns, too, as a tumbling target does: the body has that attitude then.
+    With an attitude it turns, too, as a tumbling target does: the body has that attitude then. Where
+    this has no attitude, or no position, and the other end has one, the body is free in it.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ class Moving(Boundary):
 
     @property
     def point(self) -> Boundary:
-        return Moving(self.position, self.velocity)
+        return Moving(self.position, self.velocity) if self.turns_body else self
 
     @property
     def structure(self) -> tuple:

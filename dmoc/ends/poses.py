@@ -83,6 +83,8 @@ class Turning(Boundary):
 class Attitude(Turning):
     """An attitude and an angular rate alone: the position of the body is left out of the problem.
 
+    Where the other end has a position, this one leaves position and velocity free.
+
     Parameters
     ----------
     quaternion : sequence of 4 floats or None
@@ -124,6 +126,9 @@ class Attitude(Turning):
 @dataclass(frozen=True)
 class Pose(Turning):
     """A position, a velocity, an attitude and an angular rate; entries that are None are free.
+
+    The other end may also be a `State` or an orbit, where attitude and rate are free, or an `Attitude`, where
+    position and velocity are.
 
     Parameters
     ----------
@@ -172,6 +177,10 @@ class Pose(Turning):
     @property
     def point(self) -> State:
         return State(self.position, self.velocity)
+
+    @property
+    def anchored(self) -> bool:
+        return self.point.anchored
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         position = np.concatenate([np.array(self.position, float), self._attitude])

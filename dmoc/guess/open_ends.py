@@ -11,6 +11,7 @@ from dmoc.effects.base import Attractor
 from dmoc.ends.base import Boundary
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import MOST_BENT, Spiral
+from dmoc.guess.turning import as_point
 from dmoc.guess.winding import Winding
 from dmoc.scene.problem import TransferProblem
 
@@ -28,10 +29,12 @@ OPPOSITE = -0.9
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Position and velocity of start and goal, NaN where nothing is known.
+    """Position and velocity of the centre of mass at start and goal, NaN where nothing is known.
 
     Near an attractor an end that leaves something open gets the state to which the other end coasts.
     """
+    if problem.inertia is not None and problem.start.has_position:
+        problem = as_point(problem)
     ends, times = (problem.start, problem.goal), (0.0, duration)
     states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]
     whole = [not np.isnan(state).any() for state in states]

@@ -122,7 +122,7 @@ def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> 
 
 def _turns(problem: TransferProblem) -> float:
     """About the revolutions to an open place around the attractor, at the rate of the start; else 0."""
-    place = problem.start.fixed()[0][None]
+    place = problem.start.point.fixed()[0][None]
     if problem.attraction.lone is None or problem.goal.anchored or np.isnan(place).any():
         return 0.0
     return float(problem.duration_bounds[0] * problem.attraction.rates(place)[0] / (2 * np.pi))

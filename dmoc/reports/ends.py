@@ -43,9 +43,10 @@ def goal_words(problem: TransferProblem) -> str:
 
 def met_words(solution: Solution) -> str:
     """Where a goal that moves is met, such as `goal met at (1.5, 0) m`; empty for one that does not."""
-    if not solution.require_problem().goal.moves:
+    goal = solution.require_problem().goal
+    if not goal.moves:
         return ""
-    if solution.attitude is not None and not solution.dimension:
+    if solution.attitude is not None and not (goal.has_position and goal.point.anchored):
         return f"goal met at the attitude {_point(solution.attitude[-1])}"
     return f"goal met at {_point(solution.position[-1])} m"
 
@@ -53,9 +54,22 @@ def met_words(solution: Solution) -> str:
 def _places(end: Boundary, times: Sequence[float]) -> str:
     if not end.moves:
         return ""
-    unit = " m" if end.has_position else ""
-    places = [f"at {_point(end.estimate(time)[0])}{unit} at {lasting(time)}" for time in times]
+    places = [f"at {_known_place(end, time)} at {lasting(time)}" for time in times]
     return ", " + " and ".join(places)
+
+
+def _known_place(end: Boundary, time: float) -> str:
+    """Where the body is at a time, and how it is turned; what is free is left out."""
+    position, attitude = end.estimate(time)[0], None
+    if end.turns_body:
+        position, attitude = position[: 3 if end.has_position else 0], position[-4:]
+    words = []
+    # NaN is unlike itself: what is free.
+    if len(position) and (position == position).all():
+        words.append(f"{_point(position)} m")
+    if attitude is not None and (attitude == attitude).all():
+        words.append(f"the attitude {_point(attitude)}")
+    return " and ".join(words)
 
 
 def _point(position: np.ndarray, digits: int = 5) -> str:

@@ -18,7 +18,7 @@ from dmoc.parts.rows import Row
 
 
 def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
-    """The inertia and the goal of a problem, checked: a body with an inertia turns, and both its ends say how.
+    """The inertia and the goal of a problem, checked: a body with an inertia turns, and one end says how.
 
     Raises
     ------
@@ -35,14 +35,11 @@ def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, 
                 "principal axes, or a matrix of three rows"
             )
         return {}
-    for name, end in ends.items():
-        if not end.turns_body:
-            raise ValueError(
-                f"a body with an inertia turns, but its {name} has no attitude: use Pose(position, velocity, "
-                "attitude, rate) or Attitude(quaternion, rate)"
-            )
-    if start.has_position != goal.has_position:
-        raise ValueError("one end is a Pose and the other an Attitude; use the same for both")
+    if not all(end.turns_body for end in ends.values()):
+        raise ValueError(
+            "a body with an inertia turns, but neither its start nor its goal has an attitude: use "
+            "Pose(position, velocity, attitude, rate) or Attitude(quaternion, rate) for one of them"
+        )
     return {"inertia": checked_inertia(inertia), "goal": goal.oriented(start)}
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
+from dmoc.ends.mixed import with_both
 from dmoc.ends.wheels import with_wheels
 from dmoc.links.holonomic import Holonomic
 from dmoc.links.system import System
@@ -57,7 +58,9 @@ class TransferProblem:
         Time at the start [s].
     inertia : 3 floats or 3x3 floats, optional
         Inertia of the body in body axes about its centre of mass [kg m^2], principal moments or a matrix: with
-        it the body turns, and its ends are `Pose` or, for the attitude alone, `Attitude`.
+        it the body turns, and its ends are `Pose` or, for the attitude alone, `Attitude`. Of a body that
+        turns and moves one end may also be of the centre of mass alone, as `State` or an orbit, or an
+        `Attitude` alone: what it does not speak of is free there.
     links : sequence of Holonomic
         Rods, rails and surfaces that hold the body.
     system : System, optional
@@ -106,6 +109,7 @@ class TransferProblem:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        checked(self, **with_both(self.inertia, self.start, self.goal))
         checked(self, **with_wheels(self.actuator, self.start, self.goal, tuple(self.constraints)))
         checked(self, **turning_checked(self.inertia, self.start, self.goal))
         self._complete_ends()

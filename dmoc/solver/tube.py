@@ -43,7 +43,8 @@ def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | 
     5 converged within 300 iterations without the tube, all 12 that were tried with it in 80.
     """
     attractor = problem.attraction.lone
-    if attractor is None or problem.constraints or problem.actuator.force_limit() is None:
+    bare = problem.inertia is None and not problem.constraints
+    if attractor is None or not bare or problem.actuator.force_limit() is None:
         return None
     if angle_around(problem, guess) < 2 * math.pi * MANY_TURNS:
         return None

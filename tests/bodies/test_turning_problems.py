@@ -42,6 +42,7 @@ from dmoc.solver.starts import local_optima
 
 J = (1.0, 2.0, 2.8)
 REST = Attitude((1, 0, 0, 0))
+POINT = State((0, 0, 0), (0, 0, 0))
 
 
 def turn(degrees=120, axis=(1, 1, 1), duration=5.0, **more):
@@ -68,8 +69,8 @@ BAD = {
         lambda: TransferProblem(1.0, State((0,), (0,)), State((1,), (0,)), 1.0, actuator=Torque()),
         "inertia",
     ),
-    "mixed ends": (lambda: replace(turn(), goal=Pose((0, 0, 0))), "one end is a Pose"),
-    "a point goal": (lambda: replace(turn(), goal=State((0, 0, 0), (0, 0, 0))), "no attitude"),
+    "two points": (lambda: TransferProblem(1.0, POINT, POINT, 1.0, inertia=J), "neither .* has an attitude"),
+    "a goal in the plane": (lambda: replace(turn(), goal=State((0, 0), (0, 0))), "its goal .* three axes"),
     "least time without a limit": (lambda: turn(objective=Time(), duration=(1, 9)), "limit"),
     "thrusters of a limit": (lambda: Thrusters([(1, 0, 0)], [(0, 1, 0)]), "max_thrust"),
     "as many ways as places": (lambda: Thrusters([(1, 0, 0)], [(0, 1, 0), (1, 0, 0)], 1.0), "one each"),
