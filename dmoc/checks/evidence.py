@@ -22,7 +22,7 @@ from dmoc.motion.momenta import (
     velocity_along,
     without_reactions,
 )
-from dmoc.motion.scales import Scales, path_scales, wheel_momentum
+from dmoc.motion.scales import Scales, least_extent, path_scales, wheel_momentum
 from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
@@ -200,8 +200,13 @@ class Evidence:
 
     @cached_property
     def extent(self) -> float:
-        """Diagonal of the box around the path [m]; at least a billionth of what it could cover."""
-        return max(self.path.diagonal, 1e-9 * self.acceleration * self.path.duration**2) or 1.0
+        """Diagonal of the box around the path [m]; at least a billionth of what it could cover.
+
+        Of a body that turns also at least the way of its parts in the least turn.
+        """
+        covered = 1e-9 * self.acceleration * self.path.duration**2
+        least = least_extent(self.problem.mass, self.problem.inertia)
+        return max(self.path.diagonal, covered, least) or 1.0
 
     @cached_property
     def speed(self) -> float:
@@ -232,6 +237,12 @@ class Evidence:
         pulled = [np.abs(load[:, self.rates]).max(initial=0.0) for load in self.loads]
         scene = float(self.mass.max()) * max(*pulled, self.spin / self.path.duration)
         return max(self.problem.actuator.torque_limit() or 0.0, self.largest_torque, 1e-3 * scene) or 1.0
+
+    @cached_property
+    def force_of_turn(self) -> float:
+        """The force that gives the parts of a body the least turn in the duration [N]; 0 for a point mass."""
+        least = least_extent(self.problem.mass, self.problem.inertia)
+        return float(self.mass.max()) * least / self.path.duration**2
 
     @cached_property
     def kinetic(self) -> float:

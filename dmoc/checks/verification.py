@@ -150,7 +150,7 @@ def _residual(evidence: Evidence) -> Check:
     scene = np.max(
         [mass * np.abs(evidence.pulls).max(initial=0.0), mass * evidence.speed / evidence.path.duration]
     )
-    scale = np.max([actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene])
+    scale = np.max([actuator.force_limit() or 0.0, evidence.largest, 1e-3 * scene, evidence.force_of_turn])
     # Positions are known to a rounding error of their size: no row can be better than that over h^2.
     floor = mass * evidence.rounding / evidence.shortest**2
     allowed = np.where(evidence.speeds, RESIDUAL * scale + floor, RESIDUAL * evidence.torque_scale)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,14 @@ from dmoc.motion.path import DiscretePath
 # A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
 # by the optimiser, and errors of that size are no errors of a turn.
 LEAST_TURN = 1e-4
+
+
+def least_extent(mass: float, inertia: Any) -> float:
+    """The way of the parts of a body in the least turn [m]; 0 for a point mass.
+
+    A body that turns in place has only the errors of the optimiser in its position: their size is no extent.
+    """
+    return 0.0 if inertia is None else LEAST_TURN * float(np.sqrt(np.trace(inertia) / mass))
 
 
 @dataclass(frozen=True)
@@ -49,16 +58,19 @@ class Scales:
         return float(max(np.linalg.norm(part) for part in parts))
 
 
-def path_scales(path: DiscretePath) -> Scales:
-    """Extent of the path and its mean speed or that of its ends if that is more; the same for its turn."""
-    extent = path.diagonal
+def path_scales(path: DiscretePath, least: float = 0.0) -> Scales:
+    """Extent of the path and its mean speed or that of its ends if that is more; the same for its turn.
+
+    The extent is at least `least` [m].
+    """
+    extent = max(path.diagonal, least)
     made = path.coordinates
     both = np.array([path.start_velocity, path.goal_velocity])
     ends = float(np.linalg.norm(both[:, made.speeds], axis=1).max())
     # A body that ends where it began along a line of no extent is measured by what its speed would cover.
     extent = extent or ends * path.duration or 1.0
     length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
-    speed = max(length / path.duration, ends) or extent / path.duration
+    speed = max(max(length, least) / path.duration, ends) or extent / path.duration
     spins = float(np.linalg.norm(both[:, made.rates], axis=1).max())
     turn = max(path.turn, LEAST_TURN) if path.attitudes else 1.0
     turned = sum(float(angle_between(q[1:], q[:-1]).sum()) for q in path.attitudes)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import path_scales
+from dmoc.motion.scales import least_extent, path_scales
 from dmoc.results.flown_cost import cost_functions
 from dmoc.scene.problem import TransferProblem
 
@@ -55,7 +55,10 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     origin = np.where(places, 0.5 * (low + high), 0.0)
     time = guess.duration
     both = np.array([guess.start_velocity, guess.goal_velocity])[:, speeds]
-    length = guess.diagonal or float(np.abs(both).max(initial=0.0) * time) or 1.0
+    extent = guess.diagonal
+    if extent < least_extent(problem.mass, problem.inertia):
+        extent = 0.0
+    length = extent or float(np.abs(both).max(initial=0.0) * time) or 1.0
     change = length / time
     if not problem.effects:
         # Without effects the actuator alone must change the velocities of both ends into the mean one.

@@ -77,7 +77,7 @@ def cuts(
     velocity : array, shape (nodes, coordinates)
         dq/dt at every node, that of places in [m/s]; that of a quaternion gives the rate.
     extent, speed : float
-        The scales of the path [m], [m/s].
+        The scales of the path of the centre of mass [m], [m/s]; those of a point are at least its own.
     start_time : float
         [s], for zones that move.
     """
@@ -112,6 +112,10 @@ def _cuts_of(
 ) -> Iterator[Cut]:
     """`cuts` of constraints that limit the same point of the body, of which these are the motion at nodes."""
     extent, speed, start_time = scales
+    if ours[0][1].point is not None:
+        # A point far off the centre of a body that turns goes further and faster than the centre.
+        extent = max(extent, float(np.linalg.norm(np.ptp(place, axis=0))))
+        speed = max(speed, float(np.linalg.norm(velocity, axis=1).max()))
     longest = float(np.linalg.norm(np.diff(place, axis=0), axis=1).max())
     smallest = min(constraint.feature() for _, constraint in ours)
     inside, chord, moving, straight = _inside_gaps(smallest, path, place, velocity, longest)

@@ -13,7 +13,7 @@ from dmoc.motion.mesh import node_weights, step_nodes
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath
 from dmoc.motion.reference import goal_miss
-from dmoc.motion.scales import path_scales
+from dmoc.motion.scales import least_extent, path_scales
 from dmoc.motion.step import step_map
 from dmoc.results.facts import Error
 from dmoc.results.flown_cost import TINY, unpriced
@@ -25,14 +25,17 @@ LEAST_FALL = 1.5
 
 
 def change(
-    coarse: tuple[DiscretePath, float], fine: tuple[DiscretePath, float], parts: np.ndarray
+    problem: TransferProblem,
+    coarse: tuple[DiscretePath, float],
+    fine: tuple[DiscretePath, float],
+    parts: np.ndarray,
 ) -> tuple[float, float]:
     """Relative change of path and objective from one mesh to the next, at the step ends they share."""
     shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
     moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max(axis=0)
     stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
     scale = max(abs(fine[1]), TINY)
-    moved = float((moved / path_scales(fine[0]).coordinates).max())
+    moved = float((moved / path_scales(fine[0], _least(problem)).coordinates).max())
     return max(moved, stretched), abs(fine[1] - coarse[1]) / scale
 
 
@@ -51,9 +54,13 @@ def estimate(
     """
     fall = max(changes[-2]) / max(*changes[-1], 1e-300) if len(changes) > 1 else np.sqrt(most)
     moved, cost = (change / (min(max(fall, LEAST_FALL), most) - 1) for change in changes[-1])
-    missed = path_scales(path).share(*goal_miss(dynamics, path, problem.start_time))
+    missed = path_scales(path, _least(problem)).share(*goal_miss(dynamics, path, problem.start_time))
     cost += idle_share(dynamics, path) + unpriced(problem, dynamics, path, objective)
     return Error(moved, cost, missed)
+
+
+def _least(problem: TransferProblem) -> float:
+    return least_extent(problem.mass, problem.inertia)
 
 
 def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:

@@ -131,7 +131,7 @@ class _Refinement:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
             fine = rung.path
-            self.changes.append(change((coarse, cost), (fine, rung.level.objective), parts))
+            self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
             self._hold_if_flat(rung)
             if rung.pinned and not self.flat:
                 self.flat = True
@@ -207,8 +207,8 @@ class _Refinement:
         if found is None or found.stopped or sense * (found.level.objective - cost) > 0.01 * abs(cost):
             return begun
         rung = found
-        none = np.ones(len(rung.nlp.mesh) - 1, int)
-        moved = change((begun.path, begun.level.objective), (rung.path, rung.level.objective), none)
+        before, after = ((one.path, one.level.objective) for one in (begun, rung))
+        moved = change(self.problem, before, after, np.ones(len(rung.nlp.mesh) - 1, int))
         if moved[1] > SAME_COST * self.tol:
             self.changes[-1] = (self.changes[-1][0] + moved[0], self.changes[-1][1] + moved[1])
         elif moved[0] > self.tol:

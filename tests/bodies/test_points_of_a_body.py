@@ -163,3 +163,39 @@ def test_the_path_of_the_point_is_drawn():
     lines = {line.get_label(): line for axes in page.axes for line in axes.lines}
     drawn = np.array(lines["path of point (0.8, 0, 0) m"].get_data_3d()).T
     assert drawn[0] == pytest.approx(TIP) and np.ptp(drawn, axis=0)[1] > 0.5
+
+
+def tip_in_a_turn(limit, steps, order=2, actuator=None):
+    """A turn of 170 degrees in place; the arm of 5 m sweeps 14.8 m in 5 s, 2.97 m/s on average."""
+    ends = Pose((0, 0, 0)), Pose((0, 0, 0), attitude=rotation((0, 0, 1), 170))
+    limits = [SpeedLimit(limit, point=(5, 0, 0))]
+    body = {"actuator": actuator or Wrench(), "inertia": J, "constraints": limits}
+    return solve(TransferProblem(3.0, *ends, 5.0, **body), steps=steps, order=order)
+
+
+@pytest.mark.parametrize("limit", [3.03, 3.26])
+def test_a_speed_of_the_tip_that_is_broken_between_coarse_steps_is_found(limit):
+    """The rows hold at the Gauss points of 8 steps; at those of 40 steps of order 4 they hold everywhere."""
+    coarse = tip_in_a_turn(limit, 8).raise_for_status()
+    told = verify(coarse)["bounds"]
+    assert not told.ok and "SpeedLimit 1" in told.note and told.value > 0.03 * limit
+    fine = tip_in_a_turn(limit, 40, 4).raise_for_status()
+    rates = rotated(fine.attitude[::2], np.cross(fine.rate, (5.0, 0, 0)))
+    assert np.linalg.norm(fine.velocity + rates, axis=1).max() < 1.01 * limit
+    assert verify(fine)["bounds"].ok
+
+
+@pytest.mark.parametrize("steps, order", [(6, 2), (3, 4)])
+def test_a_speed_of_the_tip_that_no_path_keeps_is_never_solved(steps, order):
+    """The body can only turn about its centre, so that the tip must be faster than on average."""
+    assert not tip_in_a_turn(2.9, steps, order, Torque()).success
+
+
+def test_a_limit_of_the_tip_that_hardly_acts_leaves_the_centre_in_place():
+    """The centre then moves by errors of the optimiser alone, which are no extent to judge by."""
+    ends = Pose((0, 0, 0)), Pose((0, 0, 0), attitude=rotation((0, 0, 1), 170))
+    limits = [SpeedLimit(3.857, point=(0, 5, 2))]
+    found = solve(
+        TransferProblem(3.0, *ends, 5.0, actuator=Wrench(), inertia=J, constraints=limits), steps=40, order=4
+    )
+    assert verify(found).ok and 0 < found.path.diagonal < 1e-5
