@@ -10,6 +10,7 @@ from dmoc.basics.quaternions import angle_between, rotated, times
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.step import step_map
+from dmoc.studies.drift import step_function
 from dmoc.studies.spinning import free_body, heavy_top, spin
 
 J = np.diag([1.0, 2.0, 2.8])
@@ -175,11 +176,21 @@ def test_runge_kutta_methods_lose_all_of_it(name):
 
 
 @pytest.mark.slow
+def test_a_hundred_thousand_steps_of_runge_kutta_lose_length_momentum_and_energy():
+    """At the length of step at which order 2 keeps them to 1e-15, 1e-13 and 2e-13."""
+    (found,) = spin(free_body(), 100_000, {"RK4": (0.1,)})
+    assert found.norm_error == pytest.approx(1.54e-5, rel=0.1)
+    assert found.momentum_error == pytest.approx(5.66e-5, rel=0.1)
+    assert found.energy_error == pytest.approx(3.93e-5, rel=0.1) and found.growth > 9
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [free_body, heavy_top])
 @pytest.mark.parametrize("name", KEPT)
 def test_a_hundred_thousand_steps(make, name):
     (found,) = spin(make(), 100_000, {name: (KEPT[name][0],)})
-    assert found.norm_error < 1e-14 and found.momentum_error < 1e-11 and found.growth < 1.6
+    assert found.norm_error < 1e-14 and found.momentum_error < 1e-11
+    assert found.growth < 1.6 or found.energy_error < 1e-12
 
 
 def test_a_heavy_top_keeps_its_vertical_momentum_and_its_energy_stays_bounded():
@@ -189,17 +200,14 @@ def test_a_heavy_top_keeps_its_vertical_momentum_and_its_energy_stays_bounded():
     assert other.momentum_error > 1e-5 and other.growth > 5
 
 
-@pytest.mark.parametrize("order", [2, 4, 6, 8])
-def test_the_one_step_map_is_symplectic_on_the_constraint(order):
-    """In small turns e about the body axes and spins z: e1.z2 - e2.z1 - z.(e1 x e2) is kept."""
-    dynamics, rule = Dynamics.of(heavy_top()), scheme(order)
-    step = step_map(dynamics, rule)
+def unkept(step, start, spin):
+    """By how much the small turns e and spins z of a step do not keep e1.z2 - e2.z1 - z.(e1 x e2).
+
+    `step` gives attitude and spin after a step as CasADi expressions of both before it.
+    """
     q, p = ca.MX.sym("q", 4), ca.MX.sym("p", 3)
-    still, mass = np.zeros((3, rule.degree + 1)), np.ones(rule.degree + 1)
-    dq, dp, _ = step(q, p, mass, still, 0.0, 0.1, np.zeros(4))
-    ends = ca.vertcat(q + dq, p + dp)
+    ends = step(q, p)
     slopes = ca.Function("slopes", [q, p], [ends, ca.jacobian(ends, ca.vertcat(q, p))])
-    start, spin = np.array(rotation((1, 2, 0.5), 40)), np.array([0.3, -0.5, 1.2])
     end, matrix = (part.full() for part in slopes(start, spin))
 
     def tangent(q):
@@ -213,7 +221,34 @@ def test_the_one_step_map_is_symplectic_on_the_constraint(order):
     # A small turn is 4 Z' of the change of q.
     after = np.block([[4 * tangent(end[:4, 0]).T, np.zeros((3, 3))], [np.zeros((3, 4)), np.eye(3)]])
     moved = after @ matrix @ before
-    assert np.abs(moved.T @ form(end[4:, 0]) @ moved - form(spin)).max() < 1e-12
+    return np.abs(moved.T @ form(end[4:, 0]) @ moved - form(spin)).max()
+
+
+TILTED, SPUN = np.array(rotation((1, 2, 0.5), 40)), np.array([0.3, -0.5, 1.2])
+
+
+@pytest.mark.parametrize("order", [2, 4, 6, 8])
+def test_the_one_step_map_is_symplectic_on_the_constraint(order):
+    dynamics, rule = Dynamics.of(heavy_top()), scheme(order)
+    still, mass = np.zeros((3, rule.degree + 1)), np.ones(rule.degree + 1)
+
+    def step(q, p):
+        dq, dp, _ = step_map(dynamics, rule)(q, p, mass, still, 0.0, 0.1, np.zeros(4))
+        return ca.vertcat(q + dq, p + dp)
+
+    assert unkept(step, TILTED, SPUN) < 1e-12
+
+
+def test_a_step_of_runge_kutta_is_not_symplectic():
+    """One step of 0.1 s changes the form by 2.4e-6, two million times what the schemes may."""
+    top = heavy_top()
+    rk4, moments = step_function("RK4", Dynamics.of(top), top), np.diag(top.inertia)
+
+    def step(q, p):
+        state = rk4(ca.vertcat(q, p / moments), 0.0, 0.1)
+        return ca.vertcat(state[:4], moments * state[4:])
+
+    assert unkept(step, TILTED, SPUN) == pytest.approx(2.4e-6, rel=0.1)
 
 
 def test_position_and_attitude_part_where_nothing_joins_them():
