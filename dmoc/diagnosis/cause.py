@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from dmoc.diagnosis.elastic import MET, MOST_ITERATIONS, Relaxation
@@ -105,7 +106,12 @@ def confirmed_cause(
     if not 0 < cause.excess <= most or np.isinf(cause.excess) or len(guess.position) > MOST_CONFIRMED:
         return cause
     finer = np.sort(np.append(guess.mesh, 0.5 * (guess.mesh[1:] + guess.mesh[:-1])))
-    again = cause_of(problem, guess.onto(finer, guess.order, guess.hold), tell, interrupt, brief=True)
+    start = guess.onto(finer, guess.order, guess.hold)
+    if cause.zones:
+        # The limits are not to blame, and what a zone has to give way tells alone whether the mesh is.
+        again = _zones(Relaxable(problem, start, tell, interrupt)) or Cause()
+    else:
+        again = cause_of(problem, start, tell, interrupt, brief=True)
     if zones and again.zones:
         return again
     if zones and LEAPT * cause.excess < again.excess < np.inf:
@@ -242,7 +248,8 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
 def _rows(transfer: Relaxable) -> Cause:
     """Every row made elastic: the rows that cannot be met, or the constraint that alone is in the way."""
     layout = transfer.nlp.rows
-    slacks = np.hstack([np.eye(layout.size), -np.eye(layout.size)])
+    every = ca.DM.eye(layout.size)
+    slacks = ca.horzcat(every, -every)
     relaxed = Relaxation(transfer.nlp, slacks, tell=transfer.tell, interrupt=transfer.interrupt)
     found = relaxed(transfer.problem, transfer.guess)
     if not found.feasible:

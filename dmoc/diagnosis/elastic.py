@@ -64,8 +64,8 @@ class Relaxation:
     ----------
     nlp : NLP
         Its objective should be the effort.
-    rows : array, shape (rows, slacks)
-        G.
+    rows : array or ca.DM, shape (rows, slacks)
+        G; as a DM if it is large and sparse: a dense array of two thousand rows takes a tenth of a second.
     columns : array of int
         Unknowns whose limits give way by the first slack.
     below, above : arrays
@@ -79,7 +79,7 @@ class Relaxation:
     def __init__(
         self,
         nlp: NLP,
-        rows: np.ndarray,
+        rows: Any,
         columns=(),
         below=(),
         above=(),
@@ -95,9 +95,9 @@ class Relaxation:
         pick = ca.DM.triplet(
             list(range(number)), self.columns.tolist(), ca.DM.ones(number), number, nlp.columns.size
         )
-        share = np.zeros((2 * number, self.count))
-        share[:, 0] = np.concatenate([-np.asarray(above, float), np.asarray(below, float)])
-        nlp_parts, settings = self._parts(_sparse(rows), ca.vertcat(pick, pick), _sparse(share))
+        given = np.concatenate([-np.asarray(above, float), np.asarray(below, float)])
+        share = ca.horzcat(ca.sparsify(ca.DM(given)), ca.DM(2 * number, self.count - 1))
+        nlp_parts, settings = self._parts(ca.sparsify(ca.DM(rows)), ca.vertcat(pick, pick), share)
         # CasADi holds no reference to its callbacks.
         sizes = [nlp_parts[name].numel() for name in ("x", "g", "p")]
         self._watch = Watch(sizes[0], sizes[1], sizes[2], None, interrupt or Interrupt())
@@ -163,7 +163,3 @@ class Relaxation:
         multipliers = {"lam_x0": found.lam_x, "lam_g0": found.lam_g}
         feasible = bool(np.isfinite(z).all() and excess <= MET)
         return Relaxed(z[-self.count :], path, feasible, multipliers, found.status == "solved")
-
-
-def _sparse(matrix: np.ndarray) -> ca.DM:
-    return ca.sparsify(ca.DM(matrix))

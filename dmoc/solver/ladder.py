@@ -61,6 +61,7 @@ class Ladder:
         self.dynamics, self.interrupt = Dynamics.of(problem), Interrupt(time_limit)
         # Whether a problem that a message names has an answer, if somebody can say.
         self.holds: Callable[[TransferProblem], bool] | None = None
+        self.patient = True  # a finer mesh is tried where a coarse one has no path
         self._rungs: list[Rung] = []
         self._levels: list[Level] = []
         # Takes attempts that were made elsewhere.
@@ -85,8 +86,7 @@ class Ladder:
         refuse_undefined_motion(self.dynamics, self.problem, known)
         if first.multipliers:
             return self._explained(self.solve_on(first), first, None, None)
-        cause = None
-        curved = is_curved(self.problem, first)
+        cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
         stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
         for mesh, rounding in stages:
@@ -94,7 +94,7 @@ class Ladder:
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
             cause = None if rung.cause is None or rung.cause.coarse else rung.cause
-            if rung.stopped or (not rung.solved and cause is not None and cause.hopeless):
+            if rung.stopped or not (rung.solved or (self.patient and not (cause and cause.hopeless))):
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first

@@ -20,11 +20,13 @@ QUESTION = "whether a remedy is enough"
 def holds(ladder: Ladder, problem: TransferProblem, solved: Callable[[Ladder], Solution]) -> bool:
     """Whether a changed problem is solved in the way that the one of a ladder was, and its answer is sound.
 
-    An attempt of a trial ends after few iterations, as the first one of any solve does.
+    An attempt of a trial ends after few iterations, as the first one of any solve does. A trial ends with the
+    first mesh that fails, which is mostly the one on which the remedy was found; but where |F| is rounded, more
+    of it on the first meshes, a later one may do.
     """
     options = {"ipopt.max_iter": MOST_TRYING} | (ladder.options or {})
     trial = Ladder(problem, options, compiled=ladder.compiled)
-    trial.interrupt = ladder.interrupt
+    trial.interrupt, trial.patient = ladder.interrupt, problem.actuator.smoothing is not None
     try:
         solution = solved(trial)
     except ValueError:
