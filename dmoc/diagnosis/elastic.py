@@ -145,7 +145,7 @@ class Relaxation:
         none = np.full(len(low), np.inf)
         solver = self.solver if near is None else self.warm
         slack = np.ones(self.count) if near is None else near.slack
-        bounds = {
+        bounds: dict[str, Any] = {
             "lbx": np.concatenate([lbx, np.full(self.count, self.least)]),
             "ubx": np.concatenate([ubx, free]),
             "lbg": np.concatenate([lbg, -none, low]),

@@ -58,6 +58,10 @@ STATUSES = {
 # The name of the status that each of Ipopt's return codes leads to.
 _STATUS_OF = {code: name for name, status in STATUSES.items() for code in status.codes}
 
+# Ipopt's return code where its steps have become as small as the rounding of the unknowns, and by how much the
+# gradient and the barrier may then be off at an optimum [-]: a tenth of the tightest tolerance.
+STALLED, SETTLED = "Search_Direction_Becomes_Too_Small", 1e-12
+
 # Every run has these settings: derivatives are given, so CasADi makes none, and the NLP is scaled already.
 ALWAYS: dict[str, Any] = {
     "no_nlp_grad": True,
@@ -116,8 +120,11 @@ def make_solver(
         ) from error
 
 
-def run(solver: ca.Function, **given: np.ndarray) -> Answer:
-    """One solve; `given` are the inputs of `nlpsol`: x0, p, bounds and multipliers, scaled."""
+def run(solver: ca.Function, rounding: float = 0.0, **given: np.ndarray) -> Answer:
+    """One solve; `given` are the inputs of `nlpsol`: x0, p, bounds and multipliers, scaled.
+
+    `rounding` is by how much rows may be off by rounding alone [-].
+    """
     begun = time.perf_counter()
     result = solver(**given)
     seconds = time.perf_counter() - begun
@@ -125,7 +132,15 @@ def run(solver: ca.Function, **given: np.ndarray) -> Answer:
     x, lam_x, lam_g, g = (np.array(result[key]).ravel() for key in ("x", "lam_x", "lam_g", "g"))
     calls = sum(count for name, count in stats.items() if name.startswith("n_call_nlp"))
     status = status_of(stats["return_status"])
+    if stats["return_status"] == STALLED and _is_settled(stats["iterations"], rounding):
+        status = "solved"
     return Answer(x, lam_x, lam_g, g, float(result["f"]), status, int(stats["iter_count"]), calls, seconds)
+
+
+def _is_settled(iterations: dict[str, list[float]], rounding: float) -> bool:
+    """Whether rows hold up to their rounding, and the optimality conditions up to that of numbers near 1."""
+    row, slope, barrier = (iterations[name][-1] for name in ("inf_pr", "inf_du", "mu"))
+    return bool(row <= rounding and max(slope, barrier) <= SETTLED)
 
 
 class Interrupt:

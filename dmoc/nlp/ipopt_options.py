@@ -42,10 +42,15 @@ def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) 
     them at most. Over very many revolutions to an open place on an orbit that place hardly changes the cost,
     and rounding is amplified by the angle passed.
     """
-    floor = 20 * np.finfo(float).eps * degree / np.diff(mesh).min()
+    floor = rounding(mesh, degree)
     if turns > VERY_MANY_TURNS:
         floor = max(floor, min(floor * 2 * np.pi * turns, LOOSEST))
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))
+
+
+def rounding(mesh: np.ndarray, degree: int) -> float:
+    """The rounding of positions over the shortest step [-], in units of the extent over the duration."""
+    return float(20 * np.finfo(float).eps * degree / np.diff(mesh).min())
 
 
 def settings_for(

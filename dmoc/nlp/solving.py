@@ -17,7 +17,7 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
-from dmoc.nlp.ipopt_options import settings_for
+from dmoc.nlp.ipopt_options import rounding, settings_for
 from dmoc.nlp.layout import Curved
 from dmoc.nlp.program import Program
 from dmoc.results.facts import Level, Provenance
@@ -110,8 +110,20 @@ class NLP(Program):
             x0, fixed = curved.unknowns(x0), lbx == ubx
             lbx, ubx = np.where(fixed, x0, lbx), np.where(fixed, x0, ubx)
         bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
-        found = run(solver, x0=x0, p=self.parameters(problem), lam_x0=lam_x, lam_g0=lam_g, **bounds)
+        given = {"x0": x0, "p": self.parameters(problem), "lam_x0": lam_x, "lam_g0": lam_g}
+        found = run(solver, self._rounding, **given, **bounds)
         return found if curved is None else curved.answer(found)
+
+    @property
+    def _rounding(self) -> float:
+        """By how much rows may be off by rounding alone, scaled.
+
+        Their unit is the impulse of the unit of force, which falls with the forces that are needed; positions
+        are rounded as ever.
+        """
+        units = self.units
+        momentum = units.mass * units.length / units.time
+        return rounding(self.mesh, self.scheme.degree) * max(1.0, momentum / (units.force * units.time))
 
     @property
     def curved(self) -> Curved | None:

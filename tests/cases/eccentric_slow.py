@@ -1,4 +1,4 @@
-"""From an eccentric orbit to another in 1.8 revolutions: 32 steps of order 8 miss the goal."""
+"""From an eccentric orbit to another in 1.8 revolutions: 50 steps of order 6 miss the goal."""
 
 from dmoc import Effort, FreeForce, PointGravity, State, TransferProblem
 

@@ -363,12 +363,7 @@ def test_steps_that_are_refused_come_with_the_least_number_that_is_not(name):
         solve(problem, steps=enough - 1, order=order)
 
 
-# Over 20 s a push fades by exp(-30), and Ipopt gives up on meshes that are fine enough for a tolerance.
-FADES = pytest.mark.xfail(strict=True, reason="a tolerance is not reached where the motion fades by exp(-30)")
-TO_TOLERANCE = [pytest.param(name, marks=FADES) if "damped" in name else name for name in REFUSED]
-
-
-@pytest.mark.parametrize("name", TO_TOLERANCE)
+@pytest.mark.parametrize("name", REFUSED)
 def test_the_program_finds_steps_that_are_enough_where_few_are_refused(name):
     """What the refusal names besides: a tolerance."""
     assert "tol=1e-4" in OPEN
