@@ -94,6 +94,7 @@ if TYPE_CHECKING:
     from dmoc.nlp.transcription import transcribe as transcribe
     from dmoc.parts.actuator import Actuator as Actuator
     from dmoc.parts.constraint import Constraint as Constraint
+    from dmoc.parts.detours import KeepOut as KeepOut
     from dmoc.parts.engines import Engine as Engine
     from dmoc.parts.engines import Nozzles as Nozzles
     from dmoc.parts.forces import BallForce as BallForce
@@ -111,7 +112,6 @@ if TYPE_CHECKING:
     from dmoc.parts.speed import SpeedLimit as SpeedLimit
     from dmoc.parts.zones import ApproachCone as ApproachCone
     from dmoc.parts.zones import KeepIn as KeepIn
-    from dmoc.parts.zones import KeepOut as KeepOut
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.results.solution import load as load

@@ -61,6 +61,16 @@ def vector(name: str, value: Any, unit: str, free: bool = False) -> tuple:
     )
 
 
+def endless_vector(name: str, value: Any, unit: str) -> tuple[float, ...]:
+    """As `vector`, but entries may be -inf and inf."""
+    given = entries(value)
+    given = (value,) if given is None else given
+    # `vector` refuses infinite numbers: they pass it as 0 and are put back afterwards.
+    endless = {i for i, x in enumerate(given) if isinstance(x, (float, np.floating)) and abs(x) == np.inf}
+    finite = vector(name, [0.0 if i in endless else x for i, x in enumerate(given)], unit)
+    return tuple(float(given[i] if i in endless else x) for i, x in enumerate(finite))
+
+
 def limits(name: str, value: Any, unit: str) -> float | tuple:
     """A positive number, or one positive number an axis."""
     if entries(value) is None:

@@ -268,10 +268,14 @@ def _zones(transfer: Relaxable) -> Cause | None:
     """Each zone relaxed alone: how much each would have to give way by itself."""
     needs, excess = [], 0.0
     for entry in transfer.zones()[:MOST_ZONES]:
-        if (limit := transfer.zone(entry)) is None:
+        if (limit := transfer.zone(entry, transfer.guess)) is None:
             continue
         found = transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        slack = transfer.clear(entry, float(found.slack[0]), found.path)
+        if found.feasible and transfer.by_angle(entry):
+            # By which angle it gives way depends on how far the path is from its tip.
+            limit = transfer.zone(entry, found.path) or limit
+            found = transfer.relaxed(limit)(transfer.problem, found.path)
+        slack = transfer.clear(entry, limit, float(found.slack[0]), found.path)
         if found.feasible and (enough := transfer.remedies([limit], slack, room=0.0)):
             needs.append(enough)
             excess = max(excess, float(found.slack[0]))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.digits import down, up
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
@@ -58,6 +59,7 @@ class Limits:
 
     problem: TransferProblem
     given: TransferProblem
+    guess: DiscretePath
     nlp: NLP
     bounds: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -148,19 +150,36 @@ class Limits:
         entries = {owner.entry for owner in owners if owner and owner.field == "constraints"}
         return sorted(entry for entry in entries if not self.problem.constraints[entry].limits_speed)
 
-    def zone(self, entry: int) -> Giving | None:
-        """One of these."""
+    def zone(self, entry: int, path: DiscretePath) -> Giving | None:
+        """One of these; where it gives way in proportion to a distance, that of the nodes of a path."""
         zone, groups = self.problem.constraints[entry], self._groups_of(entry)
         scale, unit = float(groups[0].scales.max()), groups[0].units[0]
+        weights = zone.weights(*self.places(entry, path))
+        size = scale if weights is None else 1.0
 
         def told(slack: float) -> str:
-            eased = zone.eased(slack / scale)
-            return zone.needs(eased, entry + 1, f"{up(slack / scale)} {unit}".strip()) if eased else ""
+            eased = zone.eased(slack / size)
+            return zone.needs(eased, entry + 1, f"{up(slack / size)} {unit}".strip()) if eased else ""
 
         def change(problem: TransferProblem, slack: float) -> TransferProblem:
-            return _with_constraint(problem, entry, zone.eased(slack / scale))
+            return _with_constraint(problem, entry, zone.eased(slack / size))
 
-        return self._giving(told, change, lambda slack: 1 + slack, groups)
+        found = self._giving(told, change, lambda slack: 1 + slack, groups)
+        if found is None or weights is None:
+            return found
+        group = groups[0]
+        every = np.zeros(self.nlp.rows.size)
+        every[group.indices] = (group.scales * weights[:, None]).T
+        return replace(found, signs=found.signs * every[found.rows])
+
+    def by_angle(self, entry: int) -> bool:
+        """Whether a zone gives way in proportion to a distance."""
+        return self.problem.constraints[entry].weights(*self.places(entry, self.guess)) is not None
+
+    def places(self, entry: int, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
+        """Times of the nodes of a path, and the places there that a constraint limits."""
+        times = self.problem.start_time + path.duration * path.fractions
+        return times, path.place_of(self.problem.constraints[entry])
 
     def _giving(
         self,

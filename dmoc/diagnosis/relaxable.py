@@ -83,8 +83,8 @@ class Relaxable(Limits):
         limits = self.problem.actuator.force_limit(), self._largest_speed()
         return tuple(size / (limit or np.inf) for size, limit in zip((force, speed), limits, strict=True))
 
-    def clear(self, entry: int, slack: float, path: DiscretePath) -> float:
-        """The slack with which a path keeps to a constraint between its nodes, too."""
+    def clear(self, entry: int, limit: Giving, slack: float, path: DiscretePath) -> float:
+        """The slack of a limit with which a path keeps to its constraint between the nodes, too."""
         zone = self.problem.constraints[entry]
         q = _between(path)
         times = self.problem.start_time + path.duration * np.interp(
@@ -92,8 +92,8 @@ class Relaxable(Limits):
         )
         seen = zone.seen(q, np.zeros_like(q))
         for more in np.linspace(0.0, MOST_CLEARED, 101):
-            eased = zone.eased(slack + more)
-            if eased is None or eased is zone:
+            eased = limit.change(self.problem, slack + more).constraints[entry]
+            if eased is zone:
                 break
             if eased.excess_at(times, *seen).max() <= BOUND:
                 return slack + more

@@ -171,6 +171,13 @@ class Constraint(ABC):
         """The constraint just loose enough for rows exceeded by `slack`; None if no such constraint exists."""
         return self
 
+    def weights(self, t: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+        """How far its rows give way at places along a path for a slack of 1 [unit of the rows].
+
+        None if by as much everywhere: `eased` then takes by how much, else a number that depends on the rows.
+        """
+        return None
+
     def within(self, problem: Any, entry: int) -> Any:
         """A problem with this constraint in the place of one of its own."""
         parts = [self if i == entry else part for i, part in enumerate(problem.constraints)]

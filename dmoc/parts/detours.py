@@ -1,10 +1,19 @@
-"""How a starting path gets past a ball that is in its way."""
+"""A ball to stay out of, and how a starting path gets past one that is in its way."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
+import casadi as ca
 import numpy as np
+
+from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
+from dmoc.basics.digits import down
+from dmoc.parts.constraint import Constraint, checked_point
+from dmoc.parts.outline import Ball, Shape
+from dmoc.parts.rows import Row
 
 # A path that passes the centre within this part of the radius [-] is pushed aside: no side is clearly nearer.
 CENTRAL = 0.05
@@ -12,6 +21,75 @@ CENTRAL = 0.05
 PUSHED = 0.3
 # A detour passes the centre at this many radii [-], so that half a radius is left between path and ball.
 CLEARANCE = 1.5
+
+
+@dataclass(frozen=True)
+class KeepOut(Constraint):
+    """Stay outside a sphere (a disc in the plane).
+
+    Parameters
+    ----------
+    center : sequence of float
+        Centre [m].
+    radius : float
+        Radius [m].
+    point : sequence of float, optional
+        Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
+    """
+
+    center: Vector
+    radius: float
+    point: Vector | None = None
+
+    def __post_init__(self) -> None:
+        checked(
+            self,
+            center=vector("center", self.center, "m"),
+            radius=number("radius", self.radius, "m", positive=True),
+            point=checked_point(self, self.point),
+        )
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("center", "radius") if self.point is None else ("center", "radius", "point")
+
+    def check_dimension(self, dimension: int) -> None:
+        matching_length(self, "center", len(self.center), dimension)
+
+    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
+        offset = (q - self.center) / self.radius
+        return [Row("clearance", ca.dot(offset, offset), 1.0, np.inf)]
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
+
+    def words(self) -> str:
+        center = f"({', '.join(f'{x:g}' for x in self.center)})"
+        return f"stays {self.radius:g} m away from {center} m{self.of_point}"
+
+    def violation(self, value: float, unit: str) -> tuple[float, str]:
+        return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
+
+    def eased(self, slack: float) -> KeepOut | None:
+        # The row is |d|^2 / radius^2 >= 1 - slack, so the radius shrinks by the root; from 1 on nothing is
+        # left.
+        return replace(self, radius=self.radius * float(np.sqrt(1 - slack))) if slack < 1 else None
+
+    def needs(self, eased: Constraint, index: int, amount: str) -> str:
+        radius = down(eased.feature())
+        return f"keep-out {index} of at most {radius} m radius (you gave {self.radius:g} m)"
+
+    def outline(self) -> tuple[Shape, ...]:
+        return (Ball(np.array(self.center), self.radius),)
+
+    def feature(self) -> float:
+        return self.radius
+
+    def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+        return off_centre(path, fractions, np.asarray(self.center), self.radius)
+
+    def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        return ways_round(path, fractions, np.asarray(self.center), self.radius)
 
 
 def off_centre(path: np.ndarray, fractions: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:

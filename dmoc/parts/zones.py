@@ -1,89 +1,28 @@
-"""Constraints on the position: zones to stay out of, and zones to stay in."""
+"""Constraints on the position: a box and a cone to stay in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, checked, entries, matching_length, number, same_length, short, vector
-from dmoc.basics.digits import down
+from dmoc.basics.arguments import (
+    Vector,
+    checked,
+    endless_vector,
+    matching_length,
+    number,
+    same_length,
+    short,
+    vector,
+)
+from dmoc.basics.digits import up
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.constraint import Constraint, checked_point
-from dmoc.parts.detours import off_centre, ways_round
-from dmoc.parts.outline import Ball, Box, Cone, Shape
+from dmoc.parts.outline import Box, Cone, Shape
 from dmoc.parts.rows import Row
-
-
-@dataclass(frozen=True)
-class KeepOut(Constraint):
-    """Stay outside a sphere (a disc in the plane).
-
-    Parameters
-    ----------
-    center : sequence of float
-        Centre [m].
-    radius : float
-        Radius [m].
-    point : sequence of float, optional
-        Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
-    """
-
-    center: Vector
-    radius: float
-    point: Vector | None = None
-
-    def __post_init__(self) -> None:
-        checked(
-            self,
-            center=vector("center", self.center, "m"),
-            radius=number("radius", self.radius, "m", positive=True),
-            point=checked_point(self, self.point),
-        )
-
-    @property
-    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
-        return ("center", "radius") if self.point is None else ("center", "radius", "point")
-
-    def check_dimension(self, dimension: int) -> None:
-        matching_length(self, "center", len(self.center), dimension)
-
-    def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
-        offset = (q - self.center) / self.radius
-        return [Row("clearance", ca.dot(offset, offset), 1.0, np.inf)]
-
-    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
-
-    def words(self) -> str:
-        return f"stays {self.radius:g} m away from {_place(self.center)}{self.of_point}"
-
-    def violation(self, value: float, unit: str) -> tuple[float, str]:
-        return self.radius * (1 - np.sqrt(max(1 - value, 0.0))), "m"
-
-    def eased(self, slack: float) -> KeepOut | None:
-        # The row is |d|^2 / radius^2 >= 1 - slack, so the radius shrinks by the root; from 1 on nothing is
-        # left.
-        return replace(self, radius=self.radius * float(np.sqrt(1 - slack))) if slack < 1 else None
-
-    def needs(self, eased: Constraint, index: int, amount: str) -> str:
-        radius = down(eased.feature())
-        return f"keep-out {index} of at most {radius} m radius (you gave {self.radius:g} m)"
-
-    def outline(self) -> tuple[Shape, ...]:
-        return (Ball(np.array(self.center), self.radius),)
-
-    def feature(self) -> float:
-        return self.radius
-
-    def off_centre(self, path: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-        return off_centre(path, fractions, np.asarray(self.center), self.radius)
-
-    def ways_round(self, path: np.ndarray, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-        return ways_round(path, fractions, np.asarray(self.center), self.radius)
 
 
 @dataclass(frozen=True)
@@ -103,17 +42,7 @@ class KeepIn(Constraint):
     point: Vector | None = None
 
     def __post_init__(self) -> None:
-        for name in ("lower", "upper"):
-            value = getattr(self, name)
-            given = entries(value)
-            given = (value,) if given is None else given
-            # `vector` refuses infinite numbers: they pass it as 0 m and are put back afterwards.
-            endless = {
-                i for i, x in enumerate(given) if isinstance(x, (float, np.floating)) and abs(x) == np.inf
-            }
-            finite = vector(name, [0.0 if i in endless else x for i, x in enumerate(given)], "m")
-            corner = (float(given[i] if i in endless else x) for i, x in enumerate(finite))
-            checked(self, **{name: tuple(corner)})
+        checked(self, **{name: endless_vector(name, getattr(self, name), "m") for name in ("lower", "upper")})
         same_length("KeepIn", lower=self.lower, upper=self.upper)
         checked(self, point=checked_point(self, self.point))
         for low, high in zip(self.lower, self.upper, strict=True):
@@ -244,9 +173,12 @@ class ApproachCone(Constraint):
         )
         return apex, axis / ca.sqrt(ca.dot(axis, axis))
 
+    @property
+    def _dimension(self) -> int:
+        return self._at(ca.SX.sym("t"))[0].numel() if self.moves else len(self.apex)
+
     def check_dimension(self, dimension: int) -> None:
-        size = self._at(ca.SX.sym("t"))[0].numel() if self.moves else len(self.apex)
-        matching_length(self, "apex", size, dimension)
+        matching_length(self, "apex", self._dimension, dimension)
 
     def rows(self, t: Any, q: Any, u: Any, m: Any) -> list[Row]:
         apex, axis = self._at(t) if self.moves else (self.apex, self.axis)
@@ -265,12 +197,7 @@ class ApproachCone(Constraint):
         return self.excess_at(np.zeros(len(q)), q, v)
 
     def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        apex, axis = np.asarray(self.apex), np.asarray(self.axis)
-        if self.moves:
-            time = ca.SX.sym("t")
-            moved = ca.Function("cone", [time], list(map(ca.densify, self._at(time))))(t[None])
-            apex, axis = (part.full().T for part in moved)
-        offset = q - apex
+        offset, axis = self._offset_at(t, q)
         depth = np.sum(offset * axis, axis=1)
         aside = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
         # The distance from the surface is |d| sin(angle beyond it); behind the tip it is |d| itself.
@@ -279,6 +206,31 @@ class ApproachCone(Constraint):
         # Rounded, the cone is wider by so much, which is no fault of the path.
         wider = self.rounding / np.tan(self.half_angle) if q.shape[1] == 3 else 0.0
         return np.maximum(0.0, outside - wider)
+
+    def _offset_at(self, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places from the tip, and the unit axis, at times."""
+        apex, axis = np.asarray(self.apex), np.asarray(self.axis)
+        if self.moves:
+            time = ca.SX.sym("t")
+            moved = ca.Function("cone", [time], list(map(ca.densify, self._at(time))))(t[None])
+            apex, axis = (part.full().T for part in moved)
+        return q - apex, axis
+
+    def weights(self, t: np.ndarray, q: np.ndarray) -> np.ndarray:
+        # In proportion to the distance from the tip, the rows give way by an angle.
+        return np.linalg.norm(self._offset_at(t, q)[0], axis=1)
+
+    def eased(self, slack: float) -> ApproachCone | None:
+        # With d the distance and a the angle off the axis: d sin(half_angle - a) >= -slack d in the plane,
+        # d cos(a) >= (cos(half_angle) - slack) d in space.
+        half, plane = self.half_angle, self._dimension == 2
+        half = half + np.arcsin(min(slack, 1.0)) if plane else np.arccos(max(np.cos(half) - slack, -1.0))
+        return replace(self, half_angle=float(half)) if half < np.pi / 2 else None
+
+    def needs(self, eased: Any, index: int, amount: str) -> str:
+        half = up(eased.half_angle)
+        told = f"approach cone {index} of at least {half} rad half angle, {np.degrees(float(half)):.4g} degrees"
+        return f"{told} (you gave {self.half_angle:.4g} rad)"
 
     def words(self) -> str:
         angle = np.degrees(self.half_angle)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dmoc import (
+    ApproachCone,
     Attitude,
     BallForce,
     BoxForce,
@@ -100,6 +101,13 @@ def tunnel(radius):
     """The same in a low duct in space: beside the sphere there is room for 0.7 m and hardly more."""
     walls = [KeepIn((-1, -0.2, -0.1), (5, 1.2, 0.1)), KeepOut((2, 0.5, 0.0), radius)]
     return hop((4.0, 0.0, 0.0), 5.0, actuator=BallForce(2.0), constraints=walls)
+
+
+def docked(half):
+    """To the tip of a cone past a sphere: the cone needs the half angle of its tangents, asin(0.6 / 2.5)."""
+    walls = [KeepOut((2.5, 0, 0), 0.6), ApproachCone((0, 0, 0), (1, 0, 0), half)]
+    ends = State((5, 0, 0), (0, 0, 0)), State((0, 0, 0), (0, 0, 0))
+    return TransferProblem(1.0, *ends, 10.0, constraints=walls)
 
 
 def lamp(out, near):
@@ -258,6 +266,7 @@ SCENES = {
         [((0,), RADIUS.format(2))],
     ),
     "two zones": (gate, (1.1, 1.1), {"steps": 100}, [((0,), RADIUS.format(2)), ((1,), RADIUS.format(3))]),
+    "an approach cone": (docked, (0.15,), {"steps": 80}, [((0,), "approach cone 2 of at least # rad")]),
     "two cones": (
         lamp,
         (40.0, 10.0),

@@ -34,6 +34,27 @@ def test_rows_hold_inside_only_and_have_a_gradient_everywhere(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
+def test_its_rows_give_way_by_an_angle(dimension):
+    """Rows of -slack times the distance from the tip are zero on the surface of the cone that is eased."""
+    slack, center = 0.1, np.array(APEX[:dimension])
+    cone = ApproachCone(center, np.eye(dimension)[0], ANGLE, rounding=1e-12)
+    eased = cone.eased(slack)
+    assert eased.half_angle > ANGLE + 0.05
+    turned = np.array([np.cos(eased.half_angle), np.sin(eased.half_angle), 0.0])[:dimension]
+    for distance in (0.01, 1.0, 100.0):
+        place = center + distance * turned
+        row = min(float(row.expression) for row in cone.rows(0, ca.DM(place), None, 1))
+        weight = cone.weights(np.zeros(1), place[None])[0]
+        assert row == pytest.approx(-slack * weight, rel=1e-9) and weight == pytest.approx(distance)
+    assert f"of at least {eased.half_angle:.3f}"[:-1] in cone.needs(eased, 1, "")
+
+
+def test_a_cone_that_would_be_a_half_space_is_not_named():
+    assert ApproachCone((0, 0), (1, 0), 1.2).eased(0.5) is None
+    assert ApproachCone((0, 0, 0), (1, 0, 0), 1.2).eased(0.5) is None
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
 def test_docking_through_a_cone(dimension):
     """Without the cone the path swings out of it; with it, it touches the side and costs more."""
     tail = (0.0,) * (dimension - 2)
