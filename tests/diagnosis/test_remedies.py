@@ -293,23 +293,21 @@ def remedied(given, which, numbers, share=1.0):
     return values
 
 
-# These take a second at most; the others, among them all zones, run with the long tests.
-SHORT = {
-    "force",
-    "force at order 8",
-    "force of two axes",
-    "force of two axes for least fuel",
-    "hover",
-    "least time",
-    "nozzles of their own",
-    "two speeds",
-    "torques of three axes",
+# These take four seconds and more; the others run every time.
+LONG = {
+    "rate",
+    "rate and speed",
+    "speed and force",
+    "a passage",
+    "a passage in space",
+    "a passage in a free time",
+    "two zones",
+    "an approach cone",
 }
-EVERY = [name if name in SHORT else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+EVERY = [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SCENES]
 
 
 @pytest.mark.parametrize("name", EVERY)
-@pytest.mark.slow
 def test_what_a_message_names_is_enough_and_a_tenth_less_is_not(name):
     make, given, how, remedies = SCENES[name]
     failed = solve(make(*given), **how)

@@ -179,7 +179,6 @@ def near_l1(duration):
     return TransferProblem(1.0, *ends, duration, effects=three_body(RATIO), guess=path)
 
 
-@pytest.mark.slow
 def test_two_unstable_revolutions_are_judged_by_what_they_amplify():
     found = solve(near_l1(6.4), order=8, steps=100)
     report = verify(found)

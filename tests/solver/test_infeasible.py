@@ -61,6 +61,14 @@ def on_one_mesh(failed):
     return len(tried) == 1 and {level.steps for level in levels} <= {*tried, 2 * max(tried)}
 
 
+# These take four seconds and more in each of the tables below; the others run every time.
+LONG = {"engine", "past three obstacles", "speed and force"}
+
+
+def marked(table):
+    return [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in table]
+
+
 # a problem with too small a limit as a function of the limit, that limit, and what is known of the one needed
 LIMITED = {
     "one axis": (lambda f: rest_to_rest([1.0], 1.9, actuator=BoxForce(f)), 1.0, 4 / 1.9**2),
@@ -84,8 +92,7 @@ LIMITED = {
 }
 
 
-@pytest.mark.parametrize("name", LIMITED)
-@pytest.mark.slow
+@pytest.mark.parametrize("name", marked(LIMITED))
 def test_the_limit_that_is_enough(name):
     problem, given, known = LIMITED[name]
     failed = solve(problem(given))
@@ -123,8 +130,7 @@ FAR_OFF = {
 }
 
 
-@pytest.mark.parametrize("name", FAR_OFF)
-@pytest.mark.slow
+@pytest.mark.parametrize("name", marked(FAR_OFF))
 def test_a_limit_that_is_off_by_orders_of_magnitude(name):
     problem, given, known = FAR_OFF[name]
     failed = solve(problem(given))
@@ -186,8 +192,7 @@ BRIEF = {
 }
 
 
-@pytest.mark.parametrize("name", BRIEF)
-@pytest.mark.slow
+@pytest.mark.parametrize("name", marked(BRIEF))
 def test_the_duration_that_is_enough(name):
     problem, given, known = BRIEF[name]
     failed = solve(problem(given))
@@ -241,7 +246,6 @@ def test_the_worst_rows_are_in_units_of_the_problem():
     assert lacking == pytest.approx(4 / 1.9 * 0.5 - 0.5 * 1.9, rel=0.05)
 
 
-@pytest.mark.slow
 def test_the_dry_mass_that_leaves_propellant_enough():
     """Two short burns and a coast change the velocity by 2 d / T at least, which takes so much propellant."""
     way, duration, exhaust, mass = 2.0, 4.0, 20.0, 1.7
@@ -261,7 +265,6 @@ def test_the_dry_mass_that_leaves_propellant_enough():
     assert answer.success, answer.message
 
 
-@pytest.mark.slow
 def test_between_two_attractors_the_verdict_is_one_of_the_guess():
     """One that passes on the wrong side of an attractor needs far more than another one would."""
     hurried = TransferProblem(

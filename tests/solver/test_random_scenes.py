@@ -94,7 +94,6 @@ CASES = [
 
 
 @pytest.mark.parametrize(("make", "numerics", "count"), CASES)
-@pytest.mark.slow
 def test_random_transfers_are_solved_and_certified(make, numerics, count):
     random, green = np.random.default_rng(1), 0
     for _ in range(count):

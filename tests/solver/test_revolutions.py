@@ -33,8 +33,7 @@ def test_two_revolutions_are_found_where_one_is_shorter():
     assert verify(solution).ok
 
 
-@pytest.mark.parametrize("eccentricity", [0.0, 0.3])
-@pytest.mark.slow
+@pytest.mark.parametrize("eccentricity", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_a_wider_interval_never_costs_more(eccentricity):
     intervals = [(10e3, 14e3), (10e3, 26e3), (5e3, 40e3)]
     costs = []

@@ -44,7 +44,6 @@ def test_a_tolerance_may_begin_with_two_held_steps():
     assert verify(found).ok and found.objective == pytest.approx(2.0, rel=1e-2)
 
 
-@pytest.mark.slow
 def test_contacts_with_zones_take_local_steps_and_their_error_is_foreseen():
     coarse, fine = asked("free_flyer", 1e-4), asked("free_flyer", 1e-5)
     assert verify(fine).ok and fine.error.largest <= 1e-5 and fine.steps < 2500

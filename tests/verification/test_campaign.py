@@ -27,7 +27,6 @@ def campaign():
     sys.path.remove(str(SCRIPTS))
 
 
-@pytest.mark.slow
 def test_no_answer_is_wrong_and_nearly_every_scene_has_one(campaign):
     run = campaign["run"]
     scenes = [(family, seed) for seed in range(SCENES) for family in campaign["FAMILIES"]][:SCENES]

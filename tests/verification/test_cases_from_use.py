@@ -239,7 +239,6 @@ def test_a_rocket_at_its_speed_limit():
 
 
 @pytest.mark.parametrize("order", [pytest.param(2, marks=pytest.mark.slow), 4])
-@pytest.mark.slow
 def test_goddard_in_space(order):
     """Orders 2, 4, 6 give 0.60028, 0.60033, 0.60035: they close in on 0.6003."""
     assert certified(goddard_in_space(), order=order).objective == pytest.approx(0.60035, rel=2e-4)
@@ -278,7 +277,6 @@ def test_an_ascent_through_the_air():
     assert certified(ascent()).objective == pytest.approx(88_900, rel=1e-3)
 
 
-@pytest.mark.slow
 def test_power_from_sunlight():
     solution = certified(power_from_sunlight())
     assert solution.objective == pytest.approx(0.51, rel=1e-3)
