@@ -19,6 +19,7 @@ from dmoc.solver.ladder import Ladder
 # Each problem at its defaults, (order, steps): iterations and evaluations on all meshes.
 RECORD = {
     "arm_reach": {(2, 400): (13, 206), (8, 32): (8, 78)},
+    "arm_on_flyer": {(2, 400): (14, 184), (8, 32): (10, 80)},
     "bang_bang": {(2, 400): (18, 120), (8, 32): (13, 84)},
     "crane": {(2, 400): (34, 233), (8, 32): (28, 185)},
     "drone_hop": {(2, 400): (35, 382), (8, 32): (29, 340)},
@@ -35,6 +36,7 @@ RECORD = {
     "point_to_point": {(2, 400): (1, 12), (8, 32): (1, 12)},
     "rendezvous": {(2, 400): (1, 12), (8, 32): (1, 12)},
     "fast_turn": {(2, 400): (57, 359), (8, 32): (65, 452)},
+    "hanging_chain": {(2, 400): (68, 448), (8, 32): (81, 548)},
     "heavy_top": {(2, 400): (5, 36), (8, 32): (5, 36)},
     "reorientation": {(2, 400): (5, 36), (8, 32): (5, 36)},
     "satellite_slew": {(2, 400): (35, 222), (8, 32): (24, 154)},

@@ -30,6 +30,12 @@ from dmoc import (
     Effort,
     FreeForce,
     Holonomic,
+    Joint,
+    JointDamper,
+    JointForce,
+    JointLimit,
+    JointSpring,
+    JointState,
     JointTorque,
     KeepOut,
     LinearDrag,
@@ -41,7 +47,9 @@ from dmoc import (
     Plates,
     PointGravity,
     Pose,
+    Prismatic,
     RadiationPressure,
+    Revolute,
     Rod,
     Several,
     Shadow,
@@ -71,6 +79,8 @@ HERE = TransferProblem(**scene())
 ELLIPSE = {"mu": 1.0, "a": 9.0, "e": 0.1, "i": 0.0, "node": 0.0, "argument": 0.0, "mean_anomaly": 0.0}
 PLATES = Plates((1.0,), ((1, 0, 0),), ((0, 1, 0),))
 # arguments that are good, one of which is then replaced
+HINGE = Revolute((0, 0, 1))
+JOINT = {"anchor": (0, 0, 0), "at": (0, 0, 0), "on": "", "to": "", "attitude": (1, 0, 0, 0)}
 MAKES = {
     "ApproachCone": {"apex": (9, 0), "axis": (-1, 0), "half_angle": 1.0, "rounding": 1e-6, "point": None},
     "Attitude": {"quaternion": (1, 0, 0, 0), "rate": (0, 0, 0), "other_way": False},
@@ -108,7 +118,16 @@ MAKES = {
     "FinalRadius": {"center": (0, 0)},
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
-    "JointTorque": {"rod": Rod((0, 1), 1.0), "limit": 2.0, "against": None},
+    "Fixed": JOINT,
+    "JointDamper": {"joint": HINGE, "damping": 1.0},
+    "JointForce": {"joint": Prismatic((1, 0, 0)), "limit": 2.0},
+    "JointLimit": {"joint": HINGE, "low": -1.0, "high": 1.0},
+    "JointSpring": {"joint": HINGE, "stiffness": 1.0, "rest": 0.0},
+    "JointState": {"value": 1.0, "rate": 0.0},
+    "JointTorque": {"joint": Rod((0, 1), 1.0), "limit": 2.0, "against": None},
+    "Prismatic": {"axis": (1, 0, 0), **JOINT},
+    "Revolute": {"axis": (0, 0, 1), **JOINT},
+    "Spherical": JOINT,
     "KeepIn": {"lower": (-9, -9), "upper": (9, 9), "point": None},
     "KeepOut": {"center": (2, 2), "radius": 0.5, "point": None},
     "LinearDrag": {"coefficient": 0.1, "wind": None},
@@ -269,6 +288,14 @@ def put_to_use(part):
     if isinstance(part, (Member, System, On, JointTorque, Several, MomentumLimit)):
         # They mean something in a system, or with their wheels, alone.
         return None
+    if isinstance(part, (JointState, JointForce)):
+        return None
+    if isinstance(part, (Joint, JointLimit, JointSpring, JointDamper)):
+        ends = (Pose((0, 0, 0)), Pose((0, 0, 0)))
+        parts = {"start": ends[0], "goal": ends[1], "actuator": Torque(), "inertia": (1, 1, 1)}
+        kind = "constraints" if isinstance(part, JointLimit) else "effects"
+        more = {"links": [part]} if isinstance(part, Joint) else {"links": [part.joint], kind: [part]}
+        return TransferProblem(**scene(**(parts | more)))
     if isinstance(part, Holonomic):
         ends = State((0, 0), (0, 0)), State((0, 0), (0, 0))
         return TransferProblem(**scene(start=ends[0], goal=ends[1], links=[part]))
@@ -319,6 +346,7 @@ def test_every_constructor_is_tried():
         "Effect",
         "Force",
         "Holonomic",
+        "Joint",
         "Objective",
     }
     without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}
