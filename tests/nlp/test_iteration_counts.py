@@ -19,7 +19,7 @@ from dmoc.solver.ladder import Ladder
 # Each problem at its defaults, (order, steps): iterations and evaluations on all meshes.
 RECORD = {
     "arm_reach": {(2, 400): (13, 206), (8, 32): (8, 78)},
-    "arm_on_flyer": {(2, 400): (14, 184), (8, 32): (10, 80)},
+    "arm_in_space": {(2, 400): (14, 184), (8, 32): (10, 80)},
     "bang_bang": {(2, 400): (18, 120), (8, 32): (13, 84)},
     "crane": {(2, 400): (34, 233), (8, 32): (28, 185)},
     "drone_hop": {(2, 400): (35, 382), (8, 32): (29, 340)},
