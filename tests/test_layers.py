@@ -125,7 +125,7 @@ HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
     "arguments, unused",
     [
         # force-free, coasts, a spiral to an orbit, an orbit that winds, three bodies
-        ("free_flyer", HEAVY),
+        ("free_flyer", [*HEAVY, "dmoc.links.joints", "dmoc.links.along", "dmoc.guess.turning"]),
         ("two_body_fuel", HEAVY),
         ("leo_raise --order 4", HEAVY),
         ("dionysus --json", [*HEAVY, "rich.console"]),

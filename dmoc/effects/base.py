@@ -215,11 +215,6 @@ class Between(Effect):
 
     joins: ClassVar[bool] = True
 
-    @property
-    @abstractmethod
-    def bodies(self) -> tuple[str, ...]:
-        """The names of the bodies on which it acts."""
-
 
 def _in_words(value: Any, unit: str) -> str:
     if isinstance(value, Part):

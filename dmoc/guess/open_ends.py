@@ -11,7 +11,6 @@ from dmoc.effects.base import Attractor
 from dmoc.ends.base import Boundary
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import MOST_BENT, Spiral
-from dmoc.guess.turning import as_point
 from dmoc.guess.winding import Winding
 from dmoc.scene.problem import TransferProblem
 
@@ -34,6 +33,9 @@ def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.nd
     Near an attractor an end that leaves something open gets the state to which the other end coasts.
     """
     if problem.inertia is not None and problem.start.has_position:
+        # What turns bodies is loaded for problems with such bodies alone.
+        from dmoc.guess.turning import as_point
+
         problem = as_point(problem)
     ends, times = (problem.start, problem.goal), (0.0, duration)
     states = [end.estimate(problem.start_time + at) for end, at in zip(ends, times, strict=True)]

@@ -29,6 +29,8 @@ class Holonomic(Part, ABC):
     # The unit of g: the force of the link is then per unit of it.
     unit: ClassVar[str] = "m"
 
+    # Whether it looks at the attitudes of the bodies that it holds.
+    joins_attitudes: ClassVar[bool] = False
     # Whether a picture shows where it is, by one number.
     shown: bool = False
 

@@ -43,6 +43,7 @@ class Joint(Holonomic):
     on: str = ""
     to: str = ""
     attitude: Vector = IDENTITY
+    joins_attitudes: ClassVar[bool] = True
     # How many numbers say where it is: an angle [rad] or a way [m]; 4 for a quaternion, 0 if it does not move.
     coordinates: ClassVar[int] = 0
     # How many controls a motor in it has.

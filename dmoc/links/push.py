@@ -191,6 +191,10 @@ class On(Actuator):
             checked(self, axes=given)
 
     @property
+    def turns_body(self) -> bool:  # type: ignore[override]
+        return self.push.turns_body
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         return (self.body,)
 

@@ -22,9 +22,11 @@ class _InJoint(Between):
         if not isinstance(self.joint, (Joint, Rod)) or self.joint.coordinates != 1:
             raise ValueError(f"{name}: joint must be a Revolute, Prismatic or Rod; got {short(self.joint)}")
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return self.joint.holds
+    def _told(self, kind: str, value: float, time: str = "") -> str:
+        """A constant of it in words: in N m for each radian of a hinge, in N for each metre of a slide."""
+        unit, _ = self.joint.coordinate_units
+        force = "N m" if unit == "rad" else "N"
+        return f"a {kind} of {value:g} {force}{time}/{unit} in the joint of {self.joint.name}"
 
     def check_dimension(self, dimension: int) -> None:
         if isinstance(self.joint, Rod) and dimension != 2:
@@ -62,10 +64,8 @@ class JointSpring(_InJoint):
         return 0.5 * self.stiffness * self.joint.from_rest(at, self.rest) ** 2
 
     def words(self) -> str:
-        unit, _ = self.joint.coordinate_units
         return (
-            f"a spring of {self.stiffness:g} N{' m' if unit == 'rad' else ''}/{unit} in the joint of "
-            f"{self.joint.name}, at rest at {self.rest:g} {unit}"
+            f"{self._told('spring', self.stiffness)}, at rest at {self.rest:g} {self.joint.coordinate_units[0]}"
         )
 
 
@@ -92,8 +92,4 @@ class JointDamper(_InJoint):
         return self.joint.driven(configuration, q, at, -self.damping * self.joint.rate(at))
 
     def words(self) -> str:
-        unit, _ = self.joint.coordinate_units
-        return (
-            f"a damper of {self.damping:g} N{' m' if unit == 'rad' else ''} s/{unit} in the joint of "
-            f"{self.joint.name}"
-        )
+        return self._told("damper", self.damping, " s")

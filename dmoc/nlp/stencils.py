@@ -85,7 +85,7 @@ class _Writer:
             rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q))[: body.surplus])]
             draft.limit(CONSTRAINT, "node", rows)
         self._links(draft, "", body.links_at(q))
-        at = body.at(q, ca.DM.zeros(n), m)
+        at = body.at(q, ca.DM.zeros(n), m) if self.constraints else {}
         for i, constraint in enumerate(self.constraints):
             rows = constraint.rows_at(t, at, u, m)
             draft.limit(title(constraint, i), "node", rows, Owner("constraints", i))

@@ -13,12 +13,13 @@ from dmoc.configurations.rigid import checked_inertia
 from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
-from dmoc.ends.each import Each
 from dmoc.parts.rows import Row
 
 
-def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
+def turning_checked(system: Any, inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
     """The inertia and the goal of a problem, checked: a body with an inertia turns, and one end says how.
+
+    The bodies of a system, if it is one, were checked when it was made.
 
     Raises
     ------
@@ -26,7 +27,7 @@ def turning_checked(inertia: Any, start: Boundary, goal: Boundary) -> dict[str, 
         If one is given without the other.
     """
     ends = {"start": start, "goal": goal}
-    if isinstance(start, Each) and isinstance(goal, Each):
+    if system is not None:
         return {"goal": goal.oriented(start)}
     if inertia is None:
         if any(end.turns_body for end in ends.values()):
@@ -98,7 +99,7 @@ def check_functions(problem: Any) -> None:
     for effect in problem.effects:
         if effect.turns_body:
             if _is_users(effect):
-                check_body_effect(effect, problem.inertia)
+                check_body_effect(effect, problem.inertias[0])
             continue
         single = isinstance(effect, Conservative)
         functions.append((effect, "lagrangian" if single else "force", [t, q, v, m], 1 if single else n))

@@ -111,7 +111,7 @@ class TransferProblem:
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
         checked(self, **with_both(self.inertia, self.start, self.goal))
         checked(self, **with_wheels(self.actuator, self.start, self.goal, tuple(self.constraints)))
-        checked(self, **turning_checked(self.inertia, self.start, self.goal))
+        checked(self, **turning_checked(self.system, self.inertia, self.start, self.goal))
         self._complete_ends()
         if self.objective.metered:
             checked(self, actuator=self.actuator.metered(self.dimension))

@@ -11,9 +11,7 @@ import numpy as np
 from dmoc.basics.arguments import entries, short
 from dmoc.configurations.of_problem import free_configuration
 from dmoc.effects.user_functions import evaluated
-from dmoc.ends.each import each_of
 from dmoc.links.holonomic import Holonomic
-from dmoc.links.joint import Joint
 from dmoc.links.several import Several
 from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
@@ -43,6 +41,9 @@ def of_system(problem: Any) -> dict[str, Any]:
         raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
     if any(not getattr(limit, "limits_joint", False) for limit in entries(problem.constraints) or ()):
         raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
+    # What only several bodies have is loaded for them alone.
+    from dmoc.ends.each import each_of
+
     given = entries(problem.links) or ()
     links = (*system.links, *(link for link in given if link not in system.links))
     ends = {name: each_of(name, getattr(problem, name), system, links) for name in ("start", "goal")}
@@ -83,9 +84,13 @@ def check_pushed(problem: Any) -> None:
     Raises
     ------
     ValueError
-        If it names others, or acts on a body of which there are several.
+        If it names others, acts on a body of which there are several, or turns a point mass.
     """
     names = ("",) if problem.system is None else problem.system.names
+    points = [] if problem.system is None else [b.name for b in problem.system.bodies if b.inertia is None]
+    for effect in problem.effects if points else ():
+        if effect.turns_body:
+            raise ValueError(_turned(effect, points[0]))
     for actuator in problem.actuator.parts if isinstance(problem.actuator, Several) else (problem.actuator,):
         pushed = actuator.bodies
         if problem.system is not None and pushed is None:
@@ -94,9 +99,10 @@ def check_pushed(problem: Any) -> None:
                 f"use On({names[0]!r}, {type(actuator).__name__}(...))"
             )
         for name in pushed or ():
-            if name in names:
-                continue
-            raise ValueError(f"{type(actuator).__name__} acts on {short(name)}; {_known(names)}")
+            if name not in names:
+                raise ValueError(f"{type(actuator).__name__} acts on {short(name)}; {_known(names)}")
+            if actuator.turns_body and name in points:
+                raise ValueError(_turned(getattr(actuator, "push", actuator), name))
     if problem.system is None:
         return
     n, m, u = problem.dimension, ca.SX.sym("m"), ca.SX.sym("u", problem.controls)
@@ -108,6 +114,10 @@ def check_pushed(problem: Any) -> None:
                 f"{type(term).__name__} looks at the place of one body, and a system has {len(names)}; "
                 "use Effort() or Time()"
             )
+
+
+def _turned(part: Any, name: str) -> str:
+    return f"{type(part).__name__} turns bodies, and {name} is a point mass; give it an inertia [kg m^2]"
 
 
 def _known(names: tuple[str, ...]) -> str:
@@ -138,10 +148,10 @@ def check_links(problem: Any) -> None:
         if not ca.depends_on(ca.SX(g), q):
             raise ValueError(f"{words} does not depend on the position; it must be zero where the link holds")
         rows.append(ca.vec(ca.SX(g)))
-        for field in (*link.holds,) if isinstance(link, Joint) else ():
-            if at[field].rotation is None:
+        for name in link.holds if link.joins_attitudes else ():
+            if at[name].rotation is None:
                 raise ValueError(
-                    f"{type(link).__name__} (link {i + 1}) joins {field or 'a body'}, a point mass; give it "
+                    f"{type(link).__name__} (link {i + 1}) joins {name or 'a body'}, a point mass; give it "
                     "an inertia [kg m^2], or use a Rod"
                 )
     for name in ("start", "goal"):

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from dmoc import (
     Fixed,
     FreeForce,
+    GravityGradient,
     JointDamper,
     JointForce,
     JointLimit,
@@ -338,6 +339,7 @@ def test_a_hinge_carries_what_hangs_on_it():
 
 
 ONE = Member("a", 1.0, (1, 1, 1))
+MIXED = System([ONE, Member("p", 1.0)])
 BAD = {
     "a point mass": (
         lambda: TransferProblem(System([Member("a", 1.0)], [BALL_IN_ROOM]), {}, {}, 1.0, actuator=PUSHED),
@@ -398,6 +400,16 @@ BAD = {
             System([HEAVY, LIGHT], [Fixed(on="b", to="a")]), {Fixed(on="b", to="a"): JointState(0)}, {}, 1.0
         ),
         "neither an angle nor a way",
+    ),
+    "a torque on a point": (
+        lambda: TransferProblem(MIXED, {"a": Pose((0, 0, 0))}, {}, 1.0, actuator=On("p", Torque())),
+        "Torque turns bodies, and p is a point mass",
+    ),
+    "gravity that turns a point": (
+        lambda: TransferProblem(
+            MIXED, {"a": Pose((9, 0, 0))}, {}, 1.0, [GravityGradient(1.0)], On("a", Torque())
+        ),
+        "GravityGradient turns bodies, and p is a point mass",
     ),
     "nothing known": (lambda: JointState(None, None), "both None"),
     "an end beyond its stop": (
