@@ -62,3 +62,37 @@ def test_step_and_residual_are_those_of_a_simulation(arm):
     assert np.abs(left["residual"].full()).max() < 1e-8
     given["positions"] = given["positions"] + 1e-3
     assert np.abs(residual.call(given)["residual_links"].full()).max() > 1e-4
+
+
+def test_bodies_on_joints_leave_the_package_as_they_are_solved(tmp_path):
+    problem = load_problem("arm_in_space").make()
+    export(problem, tmp_path / "functions", order=4, steps=20, c=False)
+    take = {
+        name: ca.Function.load(str(tmp_path / f"functions/{name}.casadi"))
+        for name in ("solver", "nominal", "step")
+    }
+    given = {
+        name: value for name, value in take["nominal"].call({}).items() if name in take["solver"].name_in()
+    }
+    plan, found = take["solver"].call(given), solve(problem, order=4, steps=20)
+    assert float(plan["objective"]) == pytest.approx(found.objective, rel=1e-9)
+    np.testing.assert_allclose(plan["positions"].full().T, found.position, atol=1e-9)
+    np.testing.assert_allclose(plan["attitudes"].full().T, found.attitude, atol=1e-9)
+    norms = plan["residual_norm"].full()
+    assert norms.shape == (3, 41) and float(plan["largest_residual_norm"]) == np.abs(norms).max() < 1e-12
+    # The forearm turns further from node to node than the direction of any link.
+    assert float(plan["largest_turn"]) == pytest.approx(found.path.largest_turn, rel=1e-9)
+    push = 0.01 * np.random.default_rng(2).normal(size=(41, 2))
+    flight = simulate(problem, push, 20, 4)
+    first = take["step"](
+        position=flight.position[0],
+        attitude=flight.attitude[0],
+        velocity=flight.velocity[0],
+        rate=flight.rate[0],
+        mass=problem.mass,
+        time=0.0,
+        time_step=problem.duration / 20,
+        forces=push[:3].T,
+    )
+    for name, rows in (("position", flight.position), ("attitude", flight.attitude), ("rate", flight.rate)):
+        np.testing.assert_allclose(first[f"next_{name}"].full().ravel(), rows[1], atol=1e-12)

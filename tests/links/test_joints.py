@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from dmoc import (
     Fixed,
@@ -36,11 +37,14 @@ from dmoc import (
     solve,
     verify,
 )
-from dmoc.basics.quaternions import rotated
+from dmoc.basics.quaternions import rotated, times, turned_by
+from dmoc.checks.evidence import Evidence
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.base import Body
+from dmoc.guess.starting import starting_guess
 from dmoc.links.along import states_of
 from dmoc.links.joint import room
+from dmoc.motion.momenta import flow_between_links
 from dmoc.scene.problem_file import load_problem
 
 HEAVY, LIGHT = Member("a", 3.0, (1.0, 2.0, 2.8)), Member("b", 2.0, (0.4, 0.5, 0.6))
@@ -199,6 +203,29 @@ def _pose(body):
     return Pose(*(tuple(part[0]) for part in (body.position, body.velocity, body.attitude, body.rate)))
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("joint", [one for one in JOINTS if one.motors], ids=lambda joint: type(joint).__name__)
+def test_a_motor_works_at_the_rate_of_its_joint_and_on_nothing_else(joint, seed):
+    """Its power on both bodies is u times the rate, whatever they do together: nothing is left over."""
+    draw = np.random.default_rng(seed)
+    base, value, _ = flying(joint, seed)
+    rate, u = draw.normal(size=(2, 1, joint.motors))
+    body = joint.posed(base, value, rate)
+    ends = [{"a": _pose(base), "b": _pose(body)} for _ in range(2)]
+    problem = TransferProblem(System([HEAVY, LIGHT], [joint]), *ends, 1.0, actuator=PUSH)
+    q, w = problem.start.fixed()
+    made = configuration_of(problem)
+    slopes = ca.DM(made.velocity(q, w))
+    at = made.at(ca.SX(q), ca.SX(slopes), 1.0)
+    np.testing.assert_allclose(ca.DM(ca.SX(joint.rate(at))).full().ravel(), rate[0], atol=1e-12)
+    assert (
+        np.abs(ca.DM(ca.SX(joint.off(at, value[0] if joint.coordinates == 4 else value[0, 0]))).full()).max()
+        < 1e-12
+    )
+    column = ca.DM(ca.SX(joint.driven(made, ca.SX(q), at, ca.SX(u[0])))).full().ravel()
+    assert column @ slopes.full().ravel() == pytest.approx(float(u[0] @ rate[0]), abs=1e-11)
+
+
 def bars(angles, duration):
     """Absolute angles of two hinged bars under gravity along -y, by Lagrange's equations and SciPy."""
     inertia = 1 / 12
@@ -289,6 +316,16 @@ def test_all_that_a_scene_has_works_on_joints(name):
     assert not failed(found)
 
 
+def test_links_may_be_listed_in_any_order():
+    """The guess leads each body after the one that it sits on."""
+    backwards = System(ARM.bodies, [ELBOW, SHOULDER])
+    paths = [
+        starting_guess(replace(arm(), mass=system, system=None, links=()), np.linspace(0, 1, 9), 4, False)
+        for system in (ARM, backwards)
+    ]
+    np.testing.assert_allclose(paths[0].position, paths[1].position, atol=1e-14)
+
+
 def test_springs_swing_and_dampers_slow_down_as_they_must():
     stiffness, damping, duration = 3.0, 0.4, 2.0
     inertia = BAR[2] + 0.25
@@ -303,6 +340,48 @@ def test_springs_swing_and_dampers_slow_down_as_they_must():
     shape = np.cos(beat * duration) + decay / beat * np.sin(beat * duration)
     angle = 0.1 + 0.3 * np.exp(-decay * duration) * shape
     np.testing.assert_allclose(flight.position[-1], (0.5 * np.cos(angle), 0.5 * np.sin(angle), 0), atol=1e-8)
+
+
+SPUN = Revolute((0, 1, 1), anchor=(0.4, 0, 0.1), at=(-0.3, 0.2, 0), on="b", to="a")
+
+
+def spinning(steps):
+    """Two bodies on a hinge that spin about all axes, and end as they like but for the hinge."""
+    turning = {"a": Pose((0, 0, 0), (0.1, 0, 0), rate=(0.5, -0.4, 0.6)), SPUN: JointState(0.0, 0.3)}
+    problem = pair(SPUN, 0, 1, JointTorque(SPUN), start=turning, goal={SPUN: JointState(0.9)})
+    found = solve(problem, steps=steps)
+    assert found.success
+    return found
+
+
+def test_the_checks_see_bodies_that_spin_about_all_axes():
+    found = spinning(40)
+    assert not failed(found)
+    path = found.path
+    for body, entries in (("b", slice(3, 6)), ("b", slice(10, 14))):
+        position = path.position.copy()
+        q = position[20]
+        if entries.stop == 14:
+            q[entries] = times(q[entries], turned_by(np.array([1e-6, 0, 0])))
+        else:
+            q[entries] += 1e-6
+        torn = verify(replace(found, path=replace(path, position=position)))["constraint"]
+        assert not torn.ok and "link at node 20" in torn.note, body
+
+
+def test_the_matrices_of_steps_are_those_of_the_flow_for_bodies_that_spin():
+    errors = []
+    for steps in (30, 60):
+        evidence = Evidence(spinning(steps))
+        path, n, ends = evidence.path, evidence.dynamics.freedom, evidence.ends
+        times_there, place, speed = evidence.time[ends], path.position[ends], evidence.velocity
+        given = times_there[None], place.T, speed.T, path.mass[ends][None], path.control[ends].T
+        stacked = np.array(evidence.dynamics.linearised_under_thrust(*given))
+        slopes = stacked.reshape(2 * n, steps + 1, 2 * n).transpose(1, 0, 2)
+        flow = flow_between_links(evidence.dynamics, place, speed, path.mass[0], slopes)
+        exact = np.array([expm(path.duration / steps * one) for one in 0.5 * (flow[1:] + flow[:-1])])
+        errors.append(np.abs(evidence.matrices - exact).max())
+    assert errors[1] < 0.2 * errors[0] < 1e-4, "of third order in the step"
 
 
 def test_a_joint_stops_at_its_stop():
