@@ -174,9 +174,10 @@ class Prismatic(_Axial):
 
     def rate(self, at: Mapping[str, Body]) -> Any:
         base, body = self.ends(at)
-        arm, axes = _arm(self, at), ca.SX(base.rotation).T
+        axes = ca.SX(base.rotation).T
         moves = axes @ (body.velocity + body.rotation @ ca.cross(body.rate, ca.DM(self.at)) - base.velocity)
-        return ca.DM(self.axis).T @ (moves - ca.cross(ca.SX(base.rate), arm))
+        # The way along the axis adds nothing to what the turn of the other body takes along the axis.
+        return ca.DM(self.axis).T @ (moves - ca.cross(ca.SX(base.rate), ca.DM(self.anchor)))
 
     def driven(self, configuration: Any, q: Any, at: Mapping[str, Body], u: Any) -> Any:
         base, body = self.ends(at)
@@ -184,8 +185,8 @@ class Prismatic(_Axial):
         acts = configuration.on(self.on, q, push, ca.cross(ca.DM(self.at), body.rotation.T @ push))
         if not self.to:
             return acts
-        # The reaction acts where the other body is touched.
-        return acts - configuration.on(self.to, q, push, ca.cross(_arm(self, at), ca.DM(self.axis) * u))
+        # The reaction acts along the line through the anchor.
+        return acts - configuration.on(self.to, q, push, ca.cross(ca.DM(self.anchor), ca.DM(self.axis) * u))
 
     def measured(self, base: Body, body: Body) -> np.ndarray:
         at, anchor = (np.broadcast_to(point, body.position.shape) for point in (self.at, self.anchor))
@@ -196,12 +197,6 @@ class Prismatic(_Axial):
         axis = rotated(base.attitude, np.broadcast_to(self.axis, base.position.shape))
         unturned = np.tile(IDENTITY, (len(axis), 1))
         return self.carried(base, unturned, 0 * axis, value * axis, rate * axis)
-
-
-def _arm(joint: Prismatic, at: Mapping[str, Body]) -> Any:
-    """From the centre of mass of the body that it sits on to the joint on the other, in axes of the first."""
-    base, body = joint.ends(at)
-    return ca.SX(base.rotation).T @ (body.position + body.rotation @ ca.DM(joint.at) - base.position)
 
 
 def _across(axis: np.ndarray) -> np.ndarray:
