@@ -17,7 +17,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import path_scales
+from dmoc.motion.scales import least_extent, path_scales
 from dmoc.motion.step import weighted
 
 # The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
@@ -72,7 +72,7 @@ def reference(
     start = np.concatenate([np.zeros(n), velocity, path.mass[:1]])
     march_one = remembered(partial(_dop853, dynamics, control.shape[0]), "dop853", dynamics, control.shape[0])
     given = march_one.mx_in()[:-2]
-    constants = path.position[0], _tolerances(path, velocity, control)
+    constants = path.position[0], _tolerances(dynamics, path, velocity, control)
     advance = ca.Function("advance", given, march_one(*given, *constants))
     parts = np.ones(steps, int)
     while parts.sum() <= MOST_PARTS:
@@ -107,11 +107,15 @@ def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray,
     return powers.reshape(-1, powers.shape[2]), known.mesh
 
 
-def _tolerances(path: DiscretePath, velocity: np.ndarray, control: np.ndarray) -> np.ndarray:
+def _tolerances(
+    dynamics: Dynamics, path: DiscretePath, velocity: np.ndarray, control: np.ndarray
+) -> np.ndarray:
     """Absolute errors [m], [m/s], [kg] that the integrator may make: 1e-12 of extent, speed and mass."""
     n, duration = path.position.shape[1], path.duration
     if path.attitudes:
-        scales = path_scales(path)
+        mass, pieces = path.mass[0], dynamics.configuration.pieces()
+        moments = [(share * mass, getattr(part, "moments", None)) for part, _, _, share in pieces]
+        scales = path_scales(path, max(least_extent(*one) for one in moments))
         units = path.coordinates.sized(scales.extent, 1.0, scales.momentum * path.duration)
         return 1e-12 * np.concatenate([units, scales.velocities, path.mass[:1]])
     thrust = np.abs(control).max(initial=0.0) / path.mass.min()
