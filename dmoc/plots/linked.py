@@ -18,6 +18,8 @@ from dmoc.results.solution import Solution
 TIMES = 9
 # A picture is wider than the paths in it by this part of their extent.
 MARGIN = 0.08
+# Labels of the axes in space are this far from the axes [points].
+LABELS_OFF = 14
 # Of more reactions than this the magnitudes are drawn, one curve a link.
 MOST_CURVES = 4
 
@@ -41,9 +43,11 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
         axes.margins(MARGIN)
     else:
         _set_box(axes, np.vstack([*paths.values(), *shown]))
-        axes.set_zlabel(f"z [{unit}]")
-    axes.set_xlabel(f"x [{unit}]")
-    axes.set_ylabel(f"y [{unit}]")
+        axes.set_zlabel(f"z [{unit}]", labelpad=LABELS_OFF)
+    # In space labels are kept off the numbers of an axis that is seen slantwise.
+    off = LABELS_OFF if solution.dimension == 3 else None
+    axes.set_xlabel(f"x [{unit}]", labelpad=off)
+    axes.set_ylabel(f"y [{unit}]", labelpad=off)
     axes.set_title("Path", loc="left")
     handles, labels = entries_once(axes)
     below = -0.06 if solution.dimension == 3 else -0.11
