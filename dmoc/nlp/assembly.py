@@ -103,16 +103,24 @@ class Block:
         Which constraint each row is added to; rows with the same target are added up.
     values : array, shape (len(d), count)
         The numbers d.
+    first : int
+        Where the parameters of its kernel begin among those of the NLP.
     """
 
     kernel: Kernel
     columns: np.ndarray
     targets: np.ndarray
     values: np.ndarray
+    first: int = 0
 
     @property
     def count(self) -> int:
         return self.columns.shape[1]
+
+    def moved(self, columns: int, rows: int, parameters: int) -> Block:
+        """The block behind others: so many unknowns, rows and parameters come before its own."""
+        places = self.columns + columns, self.targets + rows
+        return Block(self.kernel, *places, self.values, self.first + parameters)
 
 
 @dataclass(frozen=True)
@@ -217,7 +225,8 @@ def _evaluated(
 ) -> Iterator[tuple[str, ca.MX]]:
     """Kind and value of every result of a block that is not zero by its structure, one column an evaluation."""
     kernel, count = block.kernel, block.count
-    d, p = kernel.used
+    d, used = kernel.used
+    p = [block.first + place for place in used]
     given = [_columns(unknowns, block.columns), ca.DM(block.values[d]), ca.repmat(parameters[p], 1, count)]
     dual = [_columns(multipliers, block.targets), ca.repmat(weight, 1, count)]
     for kind, function in (kernel.compiled if compiled else kernel.functions).items():

@@ -9,7 +9,7 @@ import casadi as ca
 
 from dmoc.guess.chart import drafted
 from dmoc.nlp.assembly import kernel
-from dmoc.nlp.layout import Limit, Owner, Stencil
+from dmoc.nlp.layout import LEG_MASS, LEG_START, Limit, Owner, Stencil
 from dmoc.parts.rows import Row
 
 # A stencil takes all entries of a group, one for each evaluation.
@@ -31,6 +31,11 @@ class Draft:
         self._rows: list[ca.SX] = []
         self._targets: list[tuple[str, slice]] = []
         self._limits: list[Limit] = []
+
+    def _once(self, group: str) -> ca.SX:
+        """The symbol of a single unknown, however often it is asked for."""
+        known = dict(zip((name for name, _ in self._unknowns), self._symbols, strict=True))
+        return known[group] if group in known else self.take(group, 1)
 
     def take(self, group: str, size: int, at: slice = ALL) -> ca.SX:
         """Symbols for some of the unknowns of a group."""
@@ -63,8 +68,14 @@ class Draft:
         return self._data[-1]
 
     def mass(self, at: slice) -> ca.SX:
-        """The mass at nodes: unknowns if it burns away, a parameter if not."""
-        return self.take("mass", 1, at) if self.writer.problem.actuator.burns else self.writer.mass
+        """The mass at nodes: unknowns if it burns away, one of a leg of a mission, else a parameter."""
+        if self.writer.problem.actuator.burns:
+            return self.take("mass", 1, at)
+        return self._once(LEG_MASS) if self.writer.joined else self.writer.mass
+
+    def clock(self) -> ca.SX:
+        """The time at the start: an unknown in a leg of a mission, else a parameter."""
+        return self._once(LEG_START) if self.writer.joined else self.writer.start_time
 
     def duration(self) -> ca.SX:
         """The duration: an unknown if it is free, a parameter if not."""

@@ -15,6 +15,8 @@ from dmoc.parts.rows import Row
 
 # The group of rows g(q) = 0 has this name.
 CONSTRAINT = "constraint"
+# In a leg of a mission the time at its start and, unless it burns away, the mass are single unknowns.
+LEG_START, LEG_MASS = "start_time", "leg_mass"
 # In a chart these groups of unknowns are vectors in the frames of these nodes.
 VECTORS: dict[str, Any] = {"force": slice(None), "start.velocity": [0], "goal.velocity": [-1]}
 

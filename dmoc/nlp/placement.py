@@ -12,7 +12,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.layout import Layout, Limit, Stencil, Stencils
+from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout, Limit, Stencil, Stencils
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
@@ -30,8 +30,10 @@ class Placement:
         mesh: np.ndarray,
         units: Units,
         chart: Chart | None = None,
+        joined: bool = False,
     ):
         self.problem, self.rule, self.hold, self.mesh, self.units = problem, rule, hold, mesh, units
+        self.joined = joined
         self.dynamics = Dynamics.of(problem)
         self.steps = len(mesh) - 1
         self.counts = {"node": self.steps * rule.degree + 1, "step": self.steps, "ends": 1}
@@ -79,6 +81,10 @@ class Placement:
             columns = columns.add("reaction", "node", labels, nodes, reactions)
         if problem.actuator.burns:
             columns = columns.add("mass", "node", ("",), nodes, units.mass)
+        elif self.joined:
+            columns = columns.add(LEG_MASS, "end", ("",), 1, units.mass)
+        if self.joined:
+            columns = columns.add(LEG_START, "end", ("",), 1, units.time)
         columns = columns.add("start.velocity", "end", body.velocity_names, 1, speeds)
         columns = columns.add("goal.velocity", "end", body.velocity_names, 1, speeds)
         return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns

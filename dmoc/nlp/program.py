@@ -18,7 +18,7 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.ipopt import Answer
-from dmoc.nlp.layout import CONSTRAINT, Group, Layout
+from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
 from dmoc.scene.problem import TransferProblem
@@ -136,9 +136,11 @@ class Program:
         """
         return join([flat(values[group.name]) for group in self.columns.groups]) / join([self.columns.scales()])
 
-    def pack(self, path: DiscretePath) -> np.ndarray:
-        """Scaled unknowns of a path that stands on this mesh."""
+    def pack(self, path: DiscretePath, begin: float = 0.0) -> np.ndarray:
+        """Scaled unknowns of a path that stands on this mesh; `begin` is its time [s] where that is unknown."""
         values = {
+            LEG_START: np.array([begin]),
+            LEG_MASS: path.mass[:1],
             "position": path.position - self.units.origin,
             "force": path.control,
             "mass": path.mass,
@@ -156,6 +158,7 @@ class Program:
         values = np.asarray(x).ravel() * self.columns.scales()
         get = {group.name: group.of(values) for group in self.columns.groups}
         nodes = self.columns["position"].count
+        constant = get[LEG_MASS].item() if LEG_MASS in get else problem.mass
         return DiscretePath(
             self.mesh,
             self.scheme.order,
@@ -163,7 +166,7 @@ class Program:
             float(get["duration"].item()) if "duration" in get else problem.duration_bounds[0],
             get["position"] + self.units.origin,
             get["force"],
-            get["mass"][:, 0] if "mass" in get else np.full(nodes, problem.mass),
+            get["mass"][:, 0] if "mass" in get else np.full(nodes, constant),
             get["start.velocity"][0],
             get["goal.velocity"][0],
             made_of=self.made_of,

@@ -31,30 +31,34 @@ FIRST = slice(0, 1)
 LAST = slice(-1, None)
 
 
-def stencils_of(problem: TransferProblem, order: int, hold: bool, curved: bool = False) -> Stencils:
+def stencils_of(
+    problem: TransferProblem, order: int, hold: bool, curved: bool = False, joined: bool = False
+) -> Stencils:
     """The stencils of a problem, written down once for all problems of the same structure.
 
-    If `curved`, in the unknowns of a `Chart`.
+    If `curved`, in the unknowns of a `Chart`. If `joined`, of a leg of a mission, whose time and mass at the
+    start are unknowns.
     """
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
     zones = [(type(constraint), getattr(constraint, "structure", None)) for constraint in problem.constraints]
-    shape = configuration_of(problem), problem.free_duration, order, hold, curved
-    make = partial(_written, problem, scheme(order), hold, curved)
+    shape = configuration_of(problem), problem.free_duration, order, hold, curved, joined
+    make = partial(_written, problem, scheme(order), hold, curved, joined)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
 
 
-def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool) -> Stencils:
-    writer = _Writer(problem, rule, hold, curved)
+def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool) -> Stencils:
+    writer = _Writer(problem, rule, hold, curved, joined)
     return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
 
 
 class _Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
-    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool):
+    def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool):
         self.problem, self.rule, self.hold, self.curved = problem, rule, hold, curved
+        self.joined = joined
         self.dynamics = Dynamics.of(problem)
         self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
@@ -73,7 +77,7 @@ class _Writer:
         u = None if self.hold else draft.control(frame)
         m, duration = draft.mass(ALL), draft.duration()
         fraction, weight = draft.number("fraction"), draft.number("weight")
-        t, q = self.start_time + fraction * duration, r + self.origin
+        t, q = draft.clock() + fraction * duration, r + self.origin
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
         resting, _ = split_effects(self.problem.effects, body)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
@@ -116,7 +120,7 @@ class _Writer:
             for place, mass in zip(r, m, strict=True)
         ]
         moving = self.dynamics.step_point(rule.degree, split_effects(problem.effects, body)[1])
-        t0 = self.start_time + begin * duration
+        t0 = draft.clock() + begin * duration
 
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
@@ -188,7 +192,8 @@ class _Writer:
         (first, before), (last, after) = (draft.place(at) for at in (FIRST, LAST))
         first, last = first + self.origin, last + self.origin
         v = {end: draft.velocity(end, frame) for end, frame in (("start", before), ("goal", after))}
-        start_time, goal_time = self.start_time, self.start_time + draft.duration()
+        start_time = draft.clock()
+        goal_time = start_time + draft.duration()
         states = {
             "start": (start_time, first, v["start"], draft.mass(FIRST)),
             "goal": (goal_time, last, v["goal"], draft.mass(LAST)),

@@ -130,3 +130,34 @@ class BallForce(Actuator):
 
     def words(self) -> str:
         return f"a force in any direction of at most {self.limit:g} N"
+
+
+@dataclass(frozen=True)
+class Unpowered(Actuator):
+    """No force at all, as in a coast: there is no control, and none is an unknown of the optimisation."""
+
+    moves_body: ClassVar[bool] = False
+
+    def size(self, dimension: int) -> int:
+        return 0
+
+    def labels(self, dimension: int) -> tuple[str, ...]:
+        return ()
+
+    def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
+        return None, None
+
+    def acts(self, configuration: Any, q: Any, u: Any) -> Any:
+        return ca.SX.zeros(configuration.size)
+
+    def force(self, u: Any) -> Any:
+        return ca.SX(0)
+
+    def throttle(self, u: Any) -> Any:
+        return ca.SX(0)
+
+    def metered(self, dimension: int) -> Actuator:
+        return self
+
+    def words(self) -> str:
+        return "nothing: the body coasts"

@@ -101,6 +101,10 @@ class Objective(ABC):
         """Cost per second with this actuator: `running`, unless the cost looks at its force or mass flow."""
         return self.running(t, q, v, u, m)
 
+    def kick(self, size: Any, mass: Any) -> Any:
+        """Cost of an impulse between two legs: a velocity change [m/s] of a mass [kg]."""
+        return 0
+
     def unit_with(self, actuator: Actuator) -> str:
         """The unit of the objective with this actuator."""
         return self.unit
@@ -280,6 +284,9 @@ class WeightedSum(Objective):
 
     def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return sum(weight * term.terminal(t, q, v, m) for weight, term in self.parts if weight)
+
+    def kick(self, size: Any, mass: Any) -> Any:
+        return sum(weight * term.kick(size, mass) for weight, term in self.parts if weight)
 
     def unit_with(self, actuator: Actuator) -> str:
         units = {term.unit_with(actuator) for weight, term in self.parts if weight}

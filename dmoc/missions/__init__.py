@@ -1,0 +1,1 @@
+"""Missions of several legs, joined by impulses, drops, conditions and other events."""

@@ -1,0 +1,162 @@
+"""The rows, unknowns and cost of one joint: states of the legs beside it, and what happens between them.
+
+At a joint the discrete equations of both legs hold with their own boundary velocities: the last momentum of the
+leg before equals dl/dv at v-, the first of the leg behind it minus dl/dv at v+. Together with v+ = v- + dv they
+are the momentum balance of a node at which an impulse acts. What is continuous is the velocity, not the
+momentum, so that the legs may have other Lagrangians or count in other frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.configurations.base import Configuration
+from dmoc.missions.legs import Instant, condition_rows
+from dmoc.missions.mission import Joint, Mission
+from dmoc.nlp.assembly import Block, kernel
+from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
+from dmoc.nlp.program import Program
+from dmoc.parts.rows import Row, snake
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A leg's program, and where its unknowns and rows begin in those of the mission."""
+
+    program: Program
+    columns: int
+    rows: int
+    parameters: int
+
+    def at(self, group: str, place: int) -> np.ndarray:
+        """Unknowns of the mission that are one entry of a group of this leg."""
+        return self.columns + self.program.columns[group].indices[:, place]
+
+
+class JointWriter:
+    """The formulas of one joint while they are being written down; see `written`."""
+
+    def __init__(self, mission: Mission, joint: Joint, legs: Sequence[Placed], own: Layout, first: int):
+        self.mission, self.joint, self.legs, self.own, self.first = mission, joint, legs, own, first
+        self._symbols: list[ca.SX] = []
+        self._places: list[np.ndarray] = []
+        self.rows: list[Row] = []
+        self.cost: Any = ca.SX(0)
+
+    @property
+    def beside(self) -> Placed:
+        """A leg at this joint: the one before it or, at the start, the first."""
+        return self.legs[self.joint.right if self.joint.left is None else self.joint.left]  # type: ignore[index]
+
+    def take(self, places: np.ndarray, name: str = "x") -> ca.SX:
+        """Symbols for some unknowns of the mission."""
+        self._symbols.append(ca.SX.sym(name, len(places)))
+        self._places.append(places)
+        return self._symbols[-1]
+
+    def take_own(self, group: str) -> ca.SX:
+        """Symbols for a group of unknowns of the joint itself."""
+        return self.take(self.first + self.own[group].indices[:, 0], group)
+
+    def state(self, index: int, last: bool) -> Instant:
+        """The state at the end of a leg, or at its begin."""
+        leg = self.legs[index]
+        program, place = leg.program, -1 if last else 0
+        q = self.take(leg.at("position", place), "q") + program.units.origin
+        w = self.take(leg.at("goal.velocity" if last else "start.velocity", 0), "v")
+        burns = "mass" in program.columns
+        m = self.take(leg.at("mass", place) if burns else leg.at(LEG_MASS, 0), "m")
+        t = self.take(leg.at(LEG_START, 0), "t")
+        return Instant(t + self.duration(index) if last else t, q, w, m)
+
+    def duration(self, index: int) -> Any:
+        """The duration of a leg: an unknown or a number."""
+        leg = self.legs[index]
+        if "duration" in leg.program.columns:
+            return self.take(leg.at("duration", 0), "T")
+        return leg.program.problem.duration_bounds[0]
+
+    def before(self) -> Instant:
+        """The state before the events."""
+        joint, body = self.joint, self.beside.program.dynamics.configuration
+        if joint.left is not None:
+            return self.state(joint.left, last=True)
+        behind = self._behind
+        if not joint.events:
+            return behind
+        speeds = self.take_own("velocity")
+        assert speeds.numel() == body.freedom
+        return Instant(behind.t, behind.q, speeds, ca.SX(float(self.mission.mass)))
+
+    def write(self) -> None:
+        """All rows and the cost of the joint."""
+        joint, speeds = self.joint, self.beside.program.dynamics.configuration.coordinates.speeds
+        self._behind = None if joint.right is None else self.state(joint.right, last=False)
+        here = self.before()
+        if joint.left is None and joint.boundary is not None:
+            self.rows += _named("start", condition_rows(joint.boundary, here))
+        for i, event in enumerate(joint.events):
+            own = self.take_own(f"event {i}") if event.unknowns(1) else ca.SX(0, 1)
+            passed = event.passed(here, own, speeds)
+            self.rows += _named(f"{snake(type(event).__name__)}_{i + 1}", passed.rows)
+            if passed.kick is not None:
+                self.cost = self.cost + self.mission.objective.kick(*passed.kick)
+            here = passed.after
+        if joint.right is None and joint.boundary is not None:
+            self.rows += _named("goal", condition_rows(joint.boundary, here))
+        if self._behind is not None and here is not self._behind:
+            self._join(here, self._behind)
+
+    def _join(self, here: Instant, behind: Instant) -> None:
+        """Rows by which the leg behind begins where the events lead."""
+        body = self.beside.program.dynamics.configuration
+        at_start = self.joint.left is None
+        if not at_start:
+            self.rows += _equal("position", body, body.along(here.q, behind.q - here.q), ("m", "rad", "N m s"))
+            self.rows.append(Row("time", behind.t - here.t, 0.0, 0.0, "s"))
+        self.rows += _equal("velocity", body, behind.v - here.v, ("m/s", "rad/s", "N m s"))
+        self.rows.append(Row("mass", behind.m - here.m, 0.0, 0.0, "kg"))
+
+    def written(self, rows: Layout, first_row: int) -> Block:
+        """The block of the joint, whose rows are the group of its name in the layout of joints."""
+        group = rows[self.joint.name]
+        places, symbols = _merged(self._places, self._symbols)
+        expressions = [row.expression for row in self.rows]
+        made = kernel("joint", symbols, ca.SX(0, 1), ca.SX(0, 1), ca.vertcat(*expressions), ca.SX(self.cost))
+        return Block(made, places[:, None], first_row + group.indices, np.empty((0, 1)))
+
+
+def _named(name: str, rows: Sequence[Row]) -> list[Row]:
+    return [row._replace(name=f"{name}.{row.name}") for row in rows]
+
+
+def _equal(name: str, body: Configuration, gap: Any, units: tuple[str, str, str]) -> list[Row]:
+    """Rows by which each way to move has no gap; `units` are those of places, attitudes and wheels."""
+    which = body.coordinates.paced(0, 1, 2)
+    return [
+        Row(f"{name}.{axis}", gap[i], 0.0, 0.0, units[which[i]]) for i, axis in enumerate(body.velocity_names)
+    ]
+
+
+def _merged(places: list[np.ndarray], symbols: list[ca.SX]) -> tuple[np.ndarray, ca.SX]:
+    return np.concatenate(places), ca.vertcat(*symbols)
+
+
+def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
+    """The unknowns of a joint itself: those of its events, and at a start with events the velocity before them."""
+    units, body = program.units, program.dynamics.configuration
+    layout = Layout()
+    if joint.left is None and joint.events:
+        scale = body.coordinates.paced(units.length / units.time, 1 / units.time, units.torque * units.time)
+        layout = layout.add("velocity", "end", body.velocity_names, 1, scale[None])
+    for i, event in enumerate(joint.events):
+        known = event.unknowns(int(body.coordinates.speeds.sum()))
+        if known:
+            scale = np.array([[units.of(unit) for _, unit in known]])
+            layout = layout.add(f"event {i}", "end", [name for name, _ in known], 1, scale)
+    return layout

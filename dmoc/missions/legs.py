@@ -1,0 +1,315 @@
+"""Legs of a mission, and what happens between them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.arguments import checked, entries, number, short, whole
+from dmoc.ends.base import Boundary
+from dmoc.parts.forces import Unpowered
+from dmoc.parts.rows import Row
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A part of a mission, with its own forces, limits and duration. What is not given is the mission's.
+
+    Parameters
+    ----------
+    duration : float or (float, float), optional
+        [s]; a pair (shortest, longest) leaves it free between the two. Without one it is free within the
+        duration of the mission.
+    effects, constraints : sequence, optional
+        What acts on the body, and the limits on its way, in this leg.
+    actuator : Actuator, optional
+        What pushes it in this leg.
+    order, steps : int, optional
+        Order of the scheme and number of steps of this leg.
+    name : str
+        Its name in messages, tables and pictures.
+    """
+
+    duration: Any = None
+    effects: Sequence | None = None
+    actuator: Any = None
+    constraints: Sequence | None = None
+    order: int | None = None
+    steps: int | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
+        if self.steps is not None:
+            whole("Leg: steps", self.steps, least=2)
+        if self.order not in (None, 2, 4, 6, 8):
+            raise ValueError(f"Leg: order must be 2, 4, 6 or 8; got {short(self.order)}")
+
+
+@dataclass(frozen=True)
+class Coast(Leg):
+    """A leg without thrust: it has no controls at all."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.actuator is not None:
+            raise ValueError("Coast: there is no actuator in a coast; use Leg(duration, actuator=...)")
+        checked(self, actuator=Unpowered())
+
+
+class Instant(NamedTuple):
+    """A state at a joint as CasADi expressions: time [s], q, independent velocities and mass [kg]."""
+
+    t: Any
+    q: Any
+    v: Any
+    m: Any
+
+
+class Passed(NamedTuple):
+    """What an event makes of a state: the one behind it, rows that must hold, and the kick in it.
+
+    The kick is the size of a velocity change [m/s] and the mass before it [kg], for the objective.
+    """
+
+    after: Instant
+    rows: list[Row]
+    kick: tuple[Any, Any] | None = None
+
+
+class Event(ABC):
+    """What happens between two legs, at one instant.
+
+    A frozen dataclass that derives from this says what becomes of a state, `passed`, and what it is in `words`.
+    An event with unknowns of its own names them in `unknowns`, and gives a guess for them in `first_guess`.
+    """
+
+    def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each unknown of its own, in a space of so many axes."""
+        return ()
+
+    def first_guess(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Likely values of its unknowns between two velocities [m/s] of the legs beside it."""
+        return np.zeros(0)
+
+    @abstractmethod
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        """What it makes of a state; `own` are its unknowns, `speeds` says which velocities are in [m/s]."""
+
+    def check_dimension(self, dimension: int) -> None:
+        """Raise ValueError if the event has no meaning in this many axes."""
+
+    @property
+    def condition(self) -> Boundary | None:
+        """A boundary whose conditions must hold at this instant."""
+        return None
+
+    def burnt(self, mass: float, kick: float = 0.0) -> float:
+        """The mass after it [kg], for a guess."""
+        return mass
+
+    @abstractmethod
+    def words(self) -> str:
+        """One line for a person."""
+
+
+@dataclass(frozen=True)
+class Impulse(Event):
+    """A change of the velocity at one instant: a burn that is short beside the motion.
+
+    Parameters
+    ----------
+    limit : float, optional
+        Largest velocity change [m/s].
+    exhaust_velocity : float, optional
+        [m/s]; with it the mass falls by Tsiolkovsky's equation m exp(-|dv| / c), without it the mass stays.
+    """
+
+    limit: float | None = None
+    exhaust_velocity: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("limit", "exhaust_velocity"):
+            if (value := getattr(self, name)) is not None:
+                checked(self, **{name: number(f"Impulse: {name}", value, "m/s", positive=True)})
+
+    def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
+        return tuple((axis, "m/s") for axis in "xyz"[:axes])
+
+    def first_guess(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        kick = after - before
+        size = float(np.linalg.norm(kick))
+        return kick * min(1.0, 0.9 * self.limit / size) if self.limit and size else kick
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        change, places = ca.SX.zeros(here.v.numel()), np.flatnonzero(speeds)
+        for i, place in enumerate(places):
+            change[int(place)] = own[i]
+        size = ca.sqrt(ca.dot(own, own))
+        mass = here.m if self.exhaust_velocity is None else here.m * ca.exp(-size / self.exhaust_velocity)
+        rows = []
+        if self.limit is not None:
+            rows.append(Row("limit", ca.dot(own, own) / self.limit**2, -np.inf, 1.0))
+        return Passed(here._replace(v=here.v + change, m=mass), rows, (size, here.m))
+
+    def burnt(self, mass: float, kick: float = 0.0) -> float:
+        return mass if self.exhaust_velocity is None else mass * float(np.exp(-kick / self.exhaust_velocity))
+
+    def words(self) -> str:
+        limit = "" if self.limit is None else f" of at most {self.limit:g} m/s"
+        return f"an impulse{limit}"
+
+
+@dataclass(frozen=True)
+class Drop(Event):
+    """A part of the body is left behind, at its velocity: the rest flies on with less mass.
+
+    Parameters
+    ----------
+    mass : float
+        What is left behind [kg].
+    """
+
+    mass: float
+
+    def __post_init__(self) -> None:
+        checked(self, mass=number("Drop: mass", self.mass, "kg", positive=True))
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        return Passed(here._replace(m=here.m - self.mass), [])
+
+    def burnt(self, mass: float, kick: float = 0.0) -> float:
+        return mass - self.mass
+
+    def words(self) -> str:
+        return f"{self.mass:g} kg are left behind"
+
+
+@dataclass(frozen=True)
+class Via(Event):
+    """A condition on the way: a place, a state, a moving point, an orbit or any `Condition`.
+
+    Parameters
+    ----------
+    boundary : Boundary or sequence of float
+        What must hold at that instant; plain numbers are a position [m], passed at any velocity.
+    """
+
+    boundary: Any
+
+    def __post_init__(self) -> None:
+        place = entries(self.boundary)
+        if place is not None:
+            from dmoc.ends.base import State
+
+            checked(self, boundary=State(tuple(place), None))
+        if not isinstance(self.boundary, Boundary):
+            raise ValueError(
+                "Via: boundary must be a position [m] or a dmoc.Boundary, such as State or Condition; "
+                f"got {short(self.boundary)}"
+            )
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.boundary.dimension not in (0, dimension):
+            raise ValueError(
+                f"Via: its condition has {self.boundary.dimension} axes but the mission {dimension}; "
+                f"give it {dimension}"
+            )
+
+    @property
+    def condition(self) -> Boundary:
+        return self.boundary
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        where = self.boundary.with_dimension(int(np.sum(speeds)) or 3)
+        return Passed(here, condition_rows(where, here))
+
+    def words(self) -> str:
+        return f"by way of {self.boundary.words()}"
+
+
+@dataclass(frozen=True)
+class Frame(Event):
+    """From here on positions count in another frame: an inertial one, one that turns, another origin.
+
+    Parameters
+    ----------
+    position : callable
+        (t [s], q [m]) -> the position in the new frame [m], of CasADi expressions. Velocities follow by its
+        derivatives.
+    name : str
+        The name of the new frame, for people.
+    """
+
+    position: Callable
+    name: str = "another frame"
+
+    def __post_init__(self) -> None:
+        if not callable(self.position):
+            raise ValueError(f"Frame: position must be a function (t, q); got {short(self.position)}")
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        t, q, v = ca.SX.sym("t"), ca.SX.sym("q", here.q.numel()), ca.SX.sym("v", here.v.numel())
+        moved = ca.SX(ca.vertcat(*ca.vertsplit(ca.SX(self.position(t, q)))))
+        if moved.numel() != q.numel():
+            raise ValueError(f"Frame: position must give {q.numel()} values; it gives {moved.numel()}")
+        change = ca.Function("frame", [t, q, v], [moved, ca.jtimes(moved, q, v) + ca.jacobian(moved, t)])
+        place, velocity = change(here.t, here.q, here.v)
+        return Passed(here._replace(q=place, v=velocity), [])
+
+    def words(self) -> str:
+        return f"from here on in {self.name}"
+
+
+@dataclass(frozen=True)
+class Bounce(Event):
+    """An impact on a surface: the velocity along it stays, that across it turns round.
+
+    Parameters
+    ----------
+    surface : callable
+        q [m] -> a CasADi expression that is 0 on the surface.
+    restitution : float
+        The share of the velocity across that is left [-]: 1 keeps the energy.
+    """
+
+    surface: Callable
+    restitution: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not callable(self.surface):
+            raise ValueError(f"Bounce: surface must be a function of q; got {short(self.surface)}")
+        share = number("Bounce: restitution", self.restitution, "-", nonnegative=True)
+        if share > 1:
+            raise ValueError(f"Bounce: restitution must be 0 to 1 [-]; got {share:g}")
+        checked(self, restitution=share)
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+        q = ca.SX.sym("q", here.q.numel())
+        gap = ca.SX(self.surface(q))
+        slope = ca.Function("slope", [q], [gap, ca.gradient(gap, q)])
+        value, normal = slope(here.q)
+        across = ca.dot(here.v, normal) / ca.dot(normal, normal)
+        velocity = here.v - (1 + self.restitution) * across * normal
+        return Passed(here._replace(v=velocity), [Row("surface", value, 0.0, 0.0)])
+
+    def words(self) -> str:
+        return f"an impact of restitution {self.restitution:g}"
+
+
+def condition_rows(boundary: Boundary, here: Instant) -> list[Row]:
+    """What a boundary asks of a state: its fixed entries as rows, then its other conditions."""
+    rows = []
+    for name, fixed, now, unit in zip(
+        ("position", "velocity"), boundary.fixed(), (here.q, here.v), ("m", "m/s"), strict=True
+    ):
+        for i in np.flatnonzero(~np.isnan(fixed)):
+            label = f"{name}.{'xyz'[i] if len(fixed) <= 3 else i}"
+            rows.append(Row(label, now[int(i)] - float(fixed[i]), 0.0, 0.0, unit))
+    return [*rows, *boundary.rows(here.t, here.q, here.v, here.m)]

@@ -1,0 +1,296 @@
+"""Mission: a chain of legs and of what happens between them, put together and checked when made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+
+from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.effects.base import Effect
+from dmoc.ends.base import Boundary
+from dmoc.missions.ends import Free, Loose, Periodic
+from dmoc.missions.legs import Event, Impulse, Leg
+from dmoc.missions.objectives import Share
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.forces import FreeForce
+from dmoc.parts.objectives import Effort, Objective
+from dmoc.scene.problem import TransferProblem
+
+# The shortest duration of a leg that gives none is this part of the mission's longest [-].
+LEAST_SHARE = 1e-4
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Where legs meet, or where the first begins or the last ends.
+
+    Attributes
+    ----------
+    name : str
+        "start", "goal" or "joint 1" and so on.
+    events : tuple of Event
+        What happens there, in turn.
+    left, right : int or None
+        The legs before and behind it.
+    boundary : Boundary or None
+        The start or the goal of the mission.
+    """
+
+    name: str
+    events: tuple[Event, ...]
+    left: int | None
+    right: int | None
+    boundary: Boundary | None = None
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Move a body from `start` to `goal` in several legs at the least `objective`.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of the body at the start [kg].
+    start, goal : Boundary
+        As of a `TransferProblem`, or `Free()`; as a goal also `Periodic()`.
+    legs : sequence
+        `Leg`, `Coast` and, between them or at the ends, `Impulse`, `Drop`, `Via`, `Frame`, `Bounce`.
+    effects, actuator, constraints
+        Of every leg that has none of its own.
+    objective : Objective
+        Of the whole mission, such as `DeltaV()`, `Fuel()`, `FinalMass()`.
+    duration : float or (float, float), optional
+        Time of the whole mission [s]; a pair leaves it free between the two. What the legs add up to if it is
+        not given.
+    start_time : float or (float, float)
+        Time at the start [s]; a pair (earliest, latest) leaves it free between the two.
+    guess : callable, tuple of arrays or MissionSolution, optional
+        Starting guess of the path over the whole mission, as of a `TransferProblem`.
+    inertia : 3 floats or 3x3 floats, optional
+        As of a `TransferProblem`.
+
+    Raises
+    ------
+    ValueError
+        If a number has no meaning or two parts do not fit together.
+    """
+
+    mass: float
+    start: Boundary
+    goal: Boundary
+    legs: Sequence
+    effects: Sequence[Effect] = ()
+    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+    objective: Objective = Effort()  # noqa: RUF009 - immutable
+    constraints: Sequence[Constraint] = ()
+    duration: Any = None
+    start_time: Any = 0.0
+    guess: Any = None
+    inertia: Any = None
+    name: str = field(default="mission", compare=False)
+    parameters: dict = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        parts = entries(self.legs)
+        if parts is None or not all(isinstance(part, (Leg, Event)) for part in parts):
+            raise ValueError(
+                "legs must be a sequence of dmoc.Leg, Coast, Impulse, Drop, Via, Frame or Bounce; "
+                f"got {short(self.legs)}"
+            )
+        checked(self, legs=tuple(parts))
+        if not any(isinstance(part, Leg) for part in self.legs):
+            raise ValueError("legs has no leg; give at least one Leg or Coast")
+        if self.duration is not None:
+            checked(self, duration=_span("duration", self.duration))
+        span = entries(self.start_time)
+        if span is None:
+            checked(self, start_time=number("start_time", self.start_time, "s"))
+        elif len(span) != 2 or not span[0] < span[1]:
+            raise ValueError(
+                f"start_time must be one time or (earliest, latest) [s]; got {short(self.start_time)}"
+            )
+        else:
+            checked(self, start_time=tuple(number("start_time", each, "s") for each in span))
+        self._check_spans()
+        self._complete_ends()
+        for part in self.legs:
+            if isinstance(part, Event):
+                part.check_dimension(self.dimension)
+        self._check_impulses()
+        _ = self.stretches
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes, 1 to 3."""
+        return self.start.dimension
+
+    @property
+    def free_duration(self) -> bool:
+        """Whether some duration is found by the optimisation."""
+        return any(leg.free_duration for leg in self.stretches)
+
+    @property
+    def start_bounds(self) -> tuple[float, float]:
+        """Earliest and latest time of the start [s]."""
+        return self.start_time if isinstance(self.start_time, tuple) else (self.start_time, self.start_time)
+
+    @property
+    def plan(self) -> tuple[Leg, ...]:
+        """The legs alone."""
+        return tuple(part for part in self.legs if isinstance(part, Leg))
+
+    @cached_property
+    def leg_names(self) -> tuple[str, ...]:
+        """A name for each leg."""
+        kinds = (type(leg).__name__.lower() for leg in self.plan)
+        return tuple(leg.name or f"{kind} {i + 1}" for i, (leg, kind) in enumerate(zip(self.plan, kinds, strict=True)))
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """The start, where legs meet, and the goal: one more than there are legs."""
+        events: list[list[Event]] = [[]]
+        for part in self.legs:
+            if isinstance(part, Leg):
+                events.append([])
+            else:
+                events[-1].append(part)
+        last = len(events) - 1
+        names = ["start", *(f"joint {i}" for i in range(1, last)), "goal"]
+        ends = {0: self.start, last: self.goal}
+        return tuple(
+            Joint(name, tuple(here), i - 1 if i else None, i if i < last else None, ends.get(i))
+            for i, (name, here) in enumerate(zip(names, events, strict=True))
+        )
+
+    @cached_property
+    def stretches(self) -> tuple[TransferProblem, ...]:
+        """Each leg as a transfer between two joints, whose states and masses are open."""
+        ends = Loose.like(self._whole.start)
+        count = len(self.plan)
+        return tuple(
+            self._of_leg(leg, ends, ends, Share(self.objective, i == count - 1), self._span_of(leg), name)
+            for i, (leg, name) in enumerate(zip(self.plan, self.leg_names, strict=True))
+        )
+
+    def _of_leg(
+        self, leg: Leg, start: Boundary, goal: Boundary, objective: Objective, duration: Any, name: str
+    ) -> TransferProblem:
+        try:
+            return TransferProblem(
+                mass=self.mass,
+                start=start,
+                goal=goal,
+                duration=duration,
+                effects=self.effects if leg.effects is None else leg.effects,
+                actuator=self.actuator if leg.actuator is None else leg.actuator,
+                objective=objective,
+                constraints=self.constraints if leg.constraints is None else leg.constraints,
+                start_time=self.start_bounds[0],
+                inertia=self.inertia,
+                name=name,
+            )
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from error
+
+    @cached_property
+    def _whole(self) -> TransferProblem:
+        """The mission as one transfer by its first leg: it checks the parts and completes the ends."""
+        goal = Loose.like(self.start) if isinstance(self.goal, Periodic) else self.goal
+        longest = sum(_ends(self._span_of(leg))[1] for leg in self.plan)
+        shortest = sum(_ends(self._span_of(leg))[0] for leg in self.plan)
+        span = shortest if shortest == longest else (shortest, longest)
+        share = Share(self.objective, True)
+        return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])
+
+    def _complete_ends(self) -> None:
+        axes = self.start.dimension or self.goal.dimension
+        if not axes:
+            raise ValueError(
+                "neither start nor goal says how many axes there are; give Free(axes) or a center, such as "
+                "center=(0, 0)"
+            )
+        start = self.start.with_dimension(axes)
+        checked(self, start=start, goal=self.goal.with_dimension(axes))
+        whole = self._whole
+        periodic = isinstance(self.goal, Periodic)
+        checked(self, start=whole.start, goal=self.goal if periodic else whole.goal)
+
+    def _span_of(self, leg: Leg) -> Any:
+        if leg.duration is not None:
+            return leg.duration
+        if self.duration is None:
+            raise ValueError(
+                "a leg has no duration and neither has the mission; give one of them, a number or "
+                "(shortest, longest) [s]"
+            )
+        longest = _ends(self.duration)[1]
+        return (LEAST_SHARE * longest, longest)
+
+    def _check_spans(self) -> None:
+        """Legs must fit into the duration of the mission."""
+        spans = []
+        for leg, name in zip(self.plan, self.leg_names, strict=True):
+            spans.append(_ends(_span(f"duration of {name}", self._span_of(leg))))
+        if self.duration is None:
+            return
+        shortest, longest = _ends(self.duration)
+        least, most = (sum(side) for side in zip(*spans, strict=True))
+        if least > longest or most < shortest:
+            raise ValueError(
+                f"the legs last {least:g} to {most:g} s together, but the mission {shortest:g} to {longest:g} s; "
+                "change one of them"
+            )
+
+    def _check_impulses(self) -> None:
+        """Impulses without a limit must cost something, and the objective must be able to say what."""
+        from dmoc.missions.objectives import DeltaV
+        from dmoc.parts.objectives import FinalMass, Fuel
+
+        impulses = [part for part in self.legs if isinstance(part, Impulse)]
+        sought = {type(term) for weight, term in self.objective.terms if weight}
+        if impulses and Fuel in sought:
+            raise ValueError(
+                "Fuel() does not count impulses; use DeltaV() [m/s], or FinalMass() with "
+                "Impulse(exhaust_velocity=...)"
+            )
+        for one in impulses:
+            costly = DeltaV in sought or (FinalMass in sought and one.exhaust_velocity is not None)
+            if one.limit is None and not costly:
+                raise ValueError(
+                    f"an impulse without a limit costs nothing with {', '.join(sorted(t.__name__ for t in sought))}; "
+                    "use objective=DeltaV(), or Impulse(limit=...) [m/s]"
+                )
+
+    def span(
+        self, index: int, start: Boundary, goal: Boundary, start_time: float, duration: float
+    ) -> TransferProblem:
+        """A transfer between two ends by a leg's effects and the actuator of the mission, for a guess."""
+        leg = replace(self.plan[index], actuator=None) if type(self.plan[index]) is Leg else self.plan[index]
+        problem = self._of_leg(leg, start, goal, Share(self.objective, True), duration, self.leg_names[index])
+        return replace(problem, start_time=start_time)
+
+    def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:
+        """A leg as a transfer whose time, mass and duration are known."""
+        return replace(self.stretches[index], start_time=start_time, mass=mass, duration=duration)
+
+
+def _span(name: str, value: Any) -> Any:
+    ends = entries(value)
+    if ends is None:
+        return number(name, value, "s", positive=True)
+    if len(ends) != 2:
+        raise ValueError(f"{name} must be one number or (shortest, longest) [s]; got {short(value)}")
+    shortest, longest = (number(name, end, "s", positive=True) for end in ends)
+    if shortest >= longest:
+        raise ValueError(f"{name}: its shortest must be less than its longest; got {shortest:g}, {longest:g} s")
+    return shortest, longest
+
+
+def _ends(span: Any) -> tuple[float, float]:
+    return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]
+
+

@@ -1,0 +1,54 @@
+"""What missions minimise beside the objectives of transfers, and the share that a leg has in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from dmoc.parts.actuator import Actuator
+from dmoc.parts.objectives import Objective
+
+
+@dataclass(frozen=True)
+class DeltaV(Objective):
+    """Least velocity change [m/s]: the sum of all impulses, and the integral of |F| / m over burns."""
+
+    unit: ClassVar[str] = "m/s"
+    metered: ClassVar[bool] = True
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return actuator.throttle(u) / m
+
+    def kick(self, size: Any, mass: Any) -> Any:
+        return size
+
+
+@dataclass(frozen=True)
+class Share(Objective):
+    """What one leg adds to the objective of a mission; the cost of the goal belongs to the last leg alone."""
+
+    whole: Objective
+    last: bool
+
+    @property
+    def sense(self) -> int:  # type: ignore[override]
+        return self.whole.sense
+
+    @property
+    def metered(self) -> bool:  # type: ignore[override]
+        return self.whole.metered
+
+    def check_dimension(self, dimension: int) -> None:
+        self.whole.check_dimension(dimension)
+
+    def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
+        return self.whole.rate(actuator, t, q, v, u, m)
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return self.whole.terminal(t, q, v, m) if self.last else 0
+
+    def unit_with(self, actuator: Actuator) -> str:
+        return self.whole.unit_with(actuator)
+
+    def words(self) -> str:
+        return self.whole.words()

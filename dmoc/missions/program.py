@@ -1,0 +1,376 @@
+"""The NLP of a mission: the transcripts of its legs beside each other, joined by a few rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.missions.ends import Periodic
+from dmoc.missions.joining import JointWriter, Placed, own_unknowns
+from dmoc.missions.mission import Joint, Mission
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
+from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
+from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
+from dmoc.nlp.ipopt_options import rounding, settings_for
+from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
+from dmoc.nlp.placement import Placement
+from dmoc.nlp.program import Program
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import Units, units_of
+from dmoc.parts.rows import Row
+from dmoc.scene.problem import TransferProblem
+
+# The rows that belong to no joint are in the group of this name.
+WHOLE = "mission"
+
+
+@dataclass(frozen=True)
+class MissionPath:
+    """The paths of all legs, and what belongs to the joints.
+
+    Attributes
+    ----------
+    legs : tuple of DiscretePath
+    begins : tuple of float
+        Time at the start of each leg [s].
+    own : dict of array
+        Unknowns of the joints themselves, by the name of the joint [SI].
+    forces : dict of array
+        Multipliers of the rows of the joints [objective per unit of the row], by the name of the joint.
+    """
+
+    legs: tuple[DiscretePath, ...]
+    begins: tuple[float, ...]
+    own: dict[str, np.ndarray] = field(default_factory=dict)
+    forces: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def warm(self) -> bool:
+        """Whether there are multipliers to start from."""
+        return all(leg.multipliers for leg in self.legs)
+
+    def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> MissionPath:
+        """The same on other meshes and orders, one pair a leg."""
+        legs = [leg.onto(mesh, order, leg.hold) for leg, (mesh, order) in zip(self.legs, meshes, strict=True)]
+        return replace(self, legs=tuple(legs))
+
+
+@dataclass(frozen=True)
+class MissionProgram:
+    """A mission on one set of meshes as Ipopt sees it.
+
+    Unknowns and rows of the legs come first, leg by leg; then the unknowns of the joints and their rows.
+    """
+
+    mission: Mission
+    legs: tuple[Placed, ...]
+    own: dict[str, tuple[Layout, int]]
+    rows: Layout
+    first_row: int
+    row_bounds: tuple[np.ndarray, np.ndarray]
+    blocks: tuple[Block, ...]
+    cost: float
+    drop: int = -1
+
+    @classmethod
+    def of(cls, mission: Mission, problems: Sequence[TransferProblem], path: MissionPath) -> MissionProgram:
+        """The program of a mission whose legs are these problems, on the meshes of a path."""
+        sizes = [units_of(problem, leg) for problem, leg in zip(problems, path.legs, strict=True)]
+        cost = max(_cost_of(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
+        legs, blocks, at = [], [], np.zeros(3, int)
+        for problem, leg, unit in zip(problems, path.legs, sizes, strict=True):
+            program, mine, parameters = _leg_program(problem, leg, replace(unit, cost=cost))
+            legs.append(Placed(program, *map(int, at)))
+            blocks += [block.moved(*map(int, at)) for block in mine]
+            at += (program.columns.size, program.rows.size, parameters)
+        columns, first_row = int(at[0]), int(at[1])
+        own, rows, writers, bounds = {}, Layout(), [], []
+        for joint in mission.joints:
+            beside = legs[joint.right if joint.left is None else joint.left].program  # type: ignore[index]
+            layout = own_unknowns(joint, beside, mission.mass)
+            own[joint.name] = (layout, columns)
+            writer = JointWriter(mission, joint, legs, layout, columns)
+            writer.write()
+            columns += layout.size
+            rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
+            writers.append(writer)
+        drop = _row_to_drop(mission, path)
+        whole, places, expressions = _whole_rows(mission, legs, drop)
+        rows = _add(rows, WHOLE, whole, _largest([leg.program.units for leg in legs]), bounds)
+        blocks += [writer.written(rows, first_row) for writer in writers if writer.rows]
+        if whole:
+            none = ca.SX(0, 1)
+            made = kernel("mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
+            blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
+        lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
+        return cls(mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, drop)
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of unknowns, rows and parameters."""
+        last, parameters = self.legs[-1], self.legs[-1].parameters
+        columns = last.columns + last.program.columns.size + sum(layout.size for layout, _ in self.own.values())
+        return columns, self.first_row + self.rows.size, parameters + len(self._parameters_of(-1))
+
+    def column_scales(self) -> np.ndarray:
+        """Scale of every unknown."""
+        parts = [leg.program.columns.scales() for leg in self.legs]
+        return np.concatenate([*parts, *[layout.scales() for layout, _ in self.own.values()]])
+
+    def row_scales(self) -> np.ndarray:
+        """Scale of every row."""
+        return np.concatenate([*[leg.program.rows.scales() for leg in self.legs], self.rows.scales()])
+
+    def assembly(self) -> Assembly:
+        """The functions of the NLP with their sparse derivatives."""
+        scales = self.column_scales(), self.row_scales(), 1 / self.cost
+        return assemble(self.blocks, *scales, self.sizes[2])
+
+    def _parameters_of(self, index: int) -> np.ndarray:
+        program = self.legs[index].program
+        return program.parameters(program.problem)
+
+    def parameters(self) -> np.ndarray:
+        """The parameters of all legs [SI]."""
+        return np.concatenate([self._parameters_of(i) for i in range(len(self.legs))])
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of the unknowns, then of the rows."""
+        parts = [list(leg.program.bounds(leg.program.problem)) for leg in self.legs]
+        for i, (leg, sides) in enumerate(zip(self.legs, parts, strict=True)):
+            self._open_leg(i, leg.program, sides)
+        count = self.sizes[0] - sum(len(sides[0]) for sides in parts)
+        free = np.full(count, np.inf)
+        lower, upper, low, high = (list(side) for side in zip(*parts, strict=True))
+        return (
+            np.concatenate([*lower, -free]),
+            np.concatenate([*upper, free]),
+            np.concatenate([*low, self.row_bounds[0]]),
+            np.concatenate([*high, self.row_bounds[1]]),
+        )
+
+    def _open_leg(self, index: int, program: Program, sides: list[np.ndarray]) -> None:
+        """Let a joint decide on the mass and the time at the start of a leg, unless the mission fixes them."""
+        lower, upper, columns = sides[0], sides[1], program.columns
+        mission, actuator = self.mission, program.problem.actuator
+        given = index == 0 and not mission.joints[0].events
+        burns = "mass" in columns
+        place = columns["mass" if burns else LEG_MASS].start
+        scale = program.units.mass
+        least = max(actuator.dry_mass if burns else 0.0, 1e-6 * mission.mass)
+        lower[place], upper[place] = least / scale, np.inf
+        if given:
+            lower[place] = upper[place] = mission.mass / scale
+        place = columns[LEG_START].start
+        lower[place], upper[place] = -np.inf, np.inf
+        if index == 0:
+            lower[place], upper[place] = (end / program.units.time for end in mission.start_bounds)
+        if index and program.problem.constraints == self.legs[index - 1].program.problem.constraints:
+            # The place of a joint keeps its limits in the leg before it: a second time they would depend on
+            # those rows.
+            for group in program.rows.groups:
+                if group.kind == "node" and group.owner and group.owner.field == "constraints":
+                    sides[2][group.indices[:, 0]], sides[3][group.indices[:, 0]] = -np.inf, np.inf
+
+    def pack(self, path: MissionPath) -> np.ndarray:
+        """Scaled unknowns of a path on these meshes."""
+        parts = [
+            placed.program.pack(leg, begin)
+            for placed, leg, begin in zip(self.legs, path.legs, path.begins, strict=True)
+        ]
+        for name, (layout, _) in self.own.items():
+            values = path.own.get(name, np.zeros(0))
+            parts.append((values if len(values) == layout.size else np.zeros(layout.size)) / layout.scales())
+        return np.concatenate(parts)
+
+    def multipliers(self, path: MissionPath) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled multipliers of unknowns and rows; 0 where a path has none."""
+        pairs = [placed.program.multipliers(leg) for placed, leg in zip(self.legs, path.legs, strict=True)]
+        rows = [np.zeros(0)]
+        for group in self.rows.groups:
+            known = path.forces.get(group.name, np.zeros(0))
+            count = group.stop - group.start
+            size = known if len(known) == count else np.zeros(count)
+            rows.append(size / (group.scales.ravel() * self.cost))
+        own = np.zeros(self.sizes[0] - sum(len(pair[0]) for pair in pairs))
+        return np.concatenate([*[p[0] for p in pairs], own]), np.concatenate([*[p[1] for p in pairs], *rows])
+
+    def path(self, answer: Answer) -> MissionPath:
+        """The paths, with multipliers, of an answer [SI]."""
+        legs, begins = [], []
+        for placed in self.legs:
+            program = placed.program
+            columns = slice(placed.columns, placed.columns + program.columns.size)
+            rows = slice(placed.rows, placed.rows + program.rows.size)
+            x = answer.x[columns]
+            mine = replace(answer, x=x, lam_x=answer.lam_x[columns], lam_g=answer.lam_g[rows], g=answer.g[rows])
+            legs.append(program.path(program.problem, mine))
+            begins.append(float(x[program.columns[LEG_START].start] * program.units.time))
+        values = answer.x * self.column_scales()
+        own = {name: values[at : at + layout.size] for name, (layout, at) in self.own.items() if layout.size}
+        forces = {
+            group.name: answer.lam_g[self.first_row + group.start : self.first_row + group.stop]
+            * group.scales.ravel()
+            * self.cost
+            for group in self.rows.groups
+        }
+        return MissionPath(tuple(legs), tuple(begins), own, forces)
+
+    def solve(
+        self, path: MissionPath, options: dict[str, Any], watch: Watch | None = None, carried: bool = False
+    ) -> Answer:
+        """One run of Ipopt from a path on these meshes."""
+        lbx, ubx, lbg, ubg = self.bounds()
+        lam_x, lam_g = self.multipliers(path)
+        solver = make_solver(self.assembly(), self.settings(path.warm, carried), options, watch)
+        given = {"x0": np.clip(self.pack(path), lbx, ubx), "lam_x0": lam_x, "lam_g0": lam_g}
+        bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg, "p": self.parameters()}
+        return run(solver, self._rounding, **given, **bounds)
+
+    @property
+    def _rounding(self) -> float:
+        return max(rounding(leg.program.mesh, leg.program.scheme.degree) for leg in self.legs)
+
+    def settings(self, warm: bool, carried: bool) -> dict[str, Any]:
+        """Options of Ipopt: those of the legs, the loosest tolerance among them."""
+        each = [
+            settings_for(leg.program.problem, leg.program.mesh, leg.program.scheme.degree, warm, carried)
+            for leg in self.legs
+        ]
+        merged: dict[str, Any] = {}
+        for settings in each:
+            merged |= settings
+        return merged | {"ipopt.tol": max(settings["ipopt.tol"] for settings in each)}
+
+    def name_of(self, place: int, column: bool) -> str:
+        """The name of an unknown or a row, with that of its leg or joint."""
+        for placed, name in zip(self.legs, self.mission.leg_names, strict=True):
+            layout = placed.program.columns if column else placed.program.rows
+            first = placed.columns if column else placed.rows
+            if first <= place < first + layout.size:
+                return f"{name}: {layout.name_of(place - first)}"
+        if column:
+            found = next((n, a, i) for n, (a, i) in self.own.items() if i <= place < i + a.size)
+            return f"{found[0]}: {found[1].name_of(place - found[2])}"
+        return self.rows.name_of(place - self.first_row)
+
+    def violations(self, answer: Answer, count: int = 10) -> list[tuple[str, float, str]]:
+        """The most violated rows and bounds, worst first: name, size and unit."""
+        lbx, ubx, lbg, ubg = self.bounds()
+        found = []
+        for values, low, high, column in ((answer.x, lbx, ubx, True), (answer.g, lbg, ubg, False)):
+            excess = np.nan_to_num(np.maximum(low - values, values - high), nan=np.inf)
+            found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
+        found.sort(reverse=True)
+        return [(self.name_of(place, column), size, "scaled") for size, place, column in found[:count]]
+
+
+def _leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
+    rule = scheme(path.order)
+    stencils = stencils_of(problem, path.order, path.hold, joined=True)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
+    none: Any = None
+    program = Program(
+        problem,
+        Dynamics.of(problem),
+        rule,
+        path.hold,
+        path.mesh,
+        units,
+        placed.columns,
+        placed.rows,
+        placed.row_bounds,
+        none,
+    )
+    return program, placed.blocks, stencils.parameter_count
+
+
+def _cost_of(mission: Mission, path: MissionPath) -> float:
+    """About the cost of the impulses of a path."""
+    total = 0.0
+    for joint in mission.joints:
+        for values in kicks_of(joint, path.own.get(joint.name), mission.dimension):
+            total += abs(float(mission.objective.kick(float(np.linalg.norm(values)), mission.mass)))
+    return total
+
+
+def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
+    """The unknowns of each event of a joint that has some."""
+    sizes = [len(event.unknowns(axes)) for event in joint.events]
+    if own is None or not sum(sizes):
+        return []
+    return [part for part in np.split(own[-sum(sizes) :], np.cumsum(sizes)[:-1]) if len(part)]
+
+
+def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:
+    """The layout of joints with one more group, whose scaled bounds are put behind the others."""
+    if not new:
+        return rows
+    scale = np.array([[1 / _unit(units, row.unit) for row in new]])
+    bounds.append(
+        (
+            np.array([row.lower for row in new]) * scale.ravel(),
+            np.array([row.upper for row in new]) * scale.ravel(),
+        )
+    )
+    return rows.add(name, "end", [row.name for row in new], 1, scale, None, [row.unit for row in new])
+
+
+def _unit(units: Units, unit: str) -> float:
+    return units.time if unit == "s" else units.of(unit)
+
+
+def _largest(units: Sequence[Units]) -> Units:
+    return max(units, key=lambda unit: unit.time)
+
+
+def _row_to_drop(mission: Mission, path: MissionPath) -> int:
+    """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
+    return int(np.argmax(np.abs(path.legs[0].start_velocity)))
+
+
+def _whole_rows(mission: Mission, legs: Sequence[Placed], drop: int) -> tuple[list[Row], np.ndarray, ca.SX]:
+    """Rows of the mission as a whole: its duration, and that its path closes."""
+    pool: list[tuple[np.ndarray, ca.SX]] = []
+
+    def take(places: np.ndarray) -> ca.SX:
+        pool.append((places, ca.SX.sym("x", len(places))))
+        return pool[-1][1]
+
+    first, last = legs[0], legs[-1]
+    rows: list[Row] = []
+    if mission.duration is not None:
+        shortest, longest = (
+            mission.duration if isinstance(mission.duration, tuple) else (mission.duration, mission.duration)
+        )
+        total = take(last.at(LEG_START, 0)) if len(legs) > 1 else ca.SX(0)
+        total = total - take(first.at(LEG_START, 0)) if len(legs) > 1 else total
+        free = "duration" in last.program.columns
+        total = total + (take(last.at("duration", 0)) if free else last.program.problem.duration_bounds[0])
+        rows.append(Row("duration", total, shortest, longest, "s"))
+    if isinstance(mission.goal, Periodic):
+        begin = take(first.at("position", 0)) + first.program.units.origin
+        end = take(last.at("position", -1)) + last.program.units.origin
+        gap = take(last.at("goal.velocity", 0)) - take(first.at("start.velocity", 0))
+        body = first.program.dynamics.configuration
+        away = body.along(begin, end - begin)
+        rows += [
+            Row(f"closed.position.{name}", away[i], 0.0, 0.0, "m") for i, name in enumerate(body.velocity_names)
+        ]
+        rows += [
+            Row(f"closed.velocity.{name}", gap[i], 0.0, 0.0, "m/s")
+            for i, name in enumerate(body.velocity_names)
+            if i != drop
+        ]
+    if not rows:
+        return [], np.zeros(0, int), ca.SX(0, 1)
+    places = np.concatenate([where for where, _ in pool])
+    return rows, places, ca.vertcat(*[symbols for _, symbols in pool])
+
+
