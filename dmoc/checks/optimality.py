@@ -88,7 +88,7 @@ def _unassembled(evidence: Evidence) -> tuple[NLP, list]:
     problem, path = evidence.problem, evidence.path
     if evidence.largest < evidence.typical_force:
         # Torques keep their size, and so do thrusters that turn a body and hardly move it.
-        forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)])
+        forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)], bool)
         raised = np.maximum(np.abs(path.control), evidence.typical_force)
         path = replace(path, control=np.where(forces, raised, path.control))
     units = units_of(problem, path)

@@ -23,6 +23,9 @@ from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake
 
+# The size of an impulse is rounded at zero over this part of the unit of speed [-].
+ROUNDED = 1e-8
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -100,23 +103,31 @@ class JointWriter:
         here = self.before()
         if joint.left is None and joint.boundary is not None:
             self.rows += _named("start", condition_rows(joint.boundary, here))
+        units = self.beside.program.units
+        tiny = ROUNDED * units.length / units.time
         for i, event in enumerate(joint.events):
             own = self.take_own(f"event {i}") if event.unknowns(1) else ca.SX(0, 1)
-            passed = event.passed(here, own, speeds)
+            passed = event.passed(here, own, speeds, tiny)
             self.rows += _named(f"{snake(type(event).__name__)}_{i + 1}", passed.rows)
             if passed.kick is not None:
-                self.cost = self.cost + self.mission.objective.kick(*passed.kick)
+                self._pay(self.mission.objective.kick(*passed.kick))
             here = passed.after
-        if joint.right is None and joint.boundary is not None:
-            self.rows += _named("goal", condition_rows(joint.boundary, here))
+        if joint.right is None:
+            if joint.boundary is not None:
+                self.rows += _named("goal", condition_rows(joint.boundary, here))
+            body = self.beside.program.dynamics.configuration
+            seen = body.body(here.q, body.velocity(here.q, here.v))
+            self._pay(self.mission.objective.terminal(here.t, seen.position, seen.velocity, here.m))
         if self._behind is not None and here is not self._behind:
             self._join(here, self._behind)
+
+    def _pay(self, cost: Any) -> None:
+        self.cost = self.cost + self.mission.objective.sense * cost
 
     def _join(self, here: Instant, behind: Instant) -> None:
         """Rows by which the leg behind begins where the events lead."""
         body = self.beside.program.dynamics.configuration
-        at_start = self.joint.left is None
-        if not at_start:
+        if self.joint.left is not None:
             self.rows += _equal("position", body, body.along(here.q, behind.q - here.q), ("m", "rad", "N m s"))
             self.rows.append(Row("time", behind.t - here.t, 0.0, 0.0, "s"))
         self.rows += _equal("velocity", body, behind.v - here.v, ("m/s", "rad/s", "N m s"))
@@ -124,11 +135,11 @@ class JointWriter:
 
     def written(self, rows: Layout, first_row: int) -> Block:
         """The block of the joint, whose rows are the group of its name in the layout of joints."""
-        group = rows[self.joint.name]
+        targets = first_row + rows[self.joint.name].indices if self.rows else np.empty((0, 1), int)
         places, symbols = _merged(self._places, self._symbols)
         expressions = [row.expression for row in self.rows]
         made = kernel("joint", symbols, ca.SX(0, 1), ca.SX(0, 1), ca.vertcat(*expressions), ca.SX(self.cost))
-        return Block(made, places[:, None], first_row + group.indices, np.empty((0, 1)))
+        return Block(made, places[:, None], targets, np.empty((0, 1)))
 
 
 def _named(name: str, rows: Sequence[Row]) -> list[Row]:

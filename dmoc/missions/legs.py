@@ -99,8 +99,11 @@ class Event(ABC):
         return np.zeros(0)
 
     @abstractmethod
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
-        """What it makes of a state; `own` are its unknowns, `speeds` says which velocities are in [m/s]."""
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
+        """What it makes of a state.
+
+        `own` are its unknowns, `speeds` says which velocities are in [m/s], `tiny` is a speed that is nothing.
+        """
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the event has no meaning in this many axes."""
@@ -147,11 +150,12 @@ class Impulse(Event):
         size = float(np.linalg.norm(kick))
         return kick * min(1.0, 0.9 * self.limit / size) if self.limit and size else kick
 
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         change, places = ca.SX.zeros(here.v.numel()), np.flatnonzero(speeds)
         for i, place in enumerate(places):
             change[int(place)] = own[i]
-        size = ca.sqrt(ca.dot(own, own))
+        # At zero the size alone has no derivative.
+        size = ca.sqrt(ca.dot(own, own) + tiny**2)
         mass = here.m if self.exhaust_velocity is None else here.m * ca.exp(-size / self.exhaust_velocity)
         rows = []
         if self.limit is not None:
@@ -181,7 +185,7 @@ class Drop(Event):
     def __post_init__(self) -> None:
         checked(self, mass=number("Drop: mass", self.mass, "kg", positive=True))
 
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         return Passed(here._replace(m=here.m - self.mass), [])
 
     def burnt(self, mass: float, kick: float = 0.0) -> float:
@@ -226,7 +230,7 @@ class Via(Event):
     def condition(self) -> Boundary:
         return self.boundary
 
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         where = self.boundary.with_dimension(int(np.sum(speeds)) or 3)
         return Passed(here, condition_rows(where, here))
 
@@ -254,7 +258,7 @@ class Frame(Event):
         if not callable(self.position):
             raise ValueError(f"Frame: position must be a function (t, q); got {short(self.position)}")
 
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         t, q, v = ca.SX.sym("t"), ca.SX.sym("q", here.q.numel()), ca.SX.sym("v", here.v.numel())
         moved = ca.SX(ca.vertcat(*ca.vertsplit(ca.SX(self.position(t, q)))))
         if moved.numel() != q.numel():
@@ -290,7 +294,7 @@ class Bounce(Event):
             raise ValueError(f"Bounce: restitution must be 0 to 1 [-]; got {share:g}")
         checked(self, restitution=share)
 
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray) -> Passed:
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         q = ca.SX.sym("q", here.q.numel())
         gap = ca.SX(self.surface(q))
         slope = ca.Function("slope", [q], [gap, ca.gradient(gap, q)])

@@ -170,10 +170,9 @@ class Mission:
     def stretches(self) -> tuple[TransferProblem, ...]:
         """Each leg as a transfer between two joints, whose states and masses are open."""
         ends = Loose.like(self._whole.start)
-        count = len(self.plan)
         return tuple(
-            self._of_leg(leg, ends, ends, Share(self.objective, i == count - 1), self._span_of(leg), name)
-            for i, (leg, name) in enumerate(zip(self.plan, self.leg_names, strict=True))
+            self._of_leg(leg, ends, ends, Share(self.objective), self._span_of(leg), name)
+            for leg, name in zip(self.plan, self.leg_names, strict=True)
         )
 
     def _of_leg(
@@ -203,7 +202,7 @@ class Mission:
         longest = sum(_ends(self._span_of(leg))[1] for leg in self.plan)
         shortest = sum(_ends(self._span_of(leg))[0] for leg in self.plan)
         span = shortest if shortest == longest else (shortest, longest)
-        share = Share(self.objective, True)
+        share = Share(self.objective)
         return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])
 
     def _complete_ends(self) -> None:
@@ -270,7 +269,7 @@ class Mission:
     ) -> TransferProblem:
         """A transfer between two ends by a leg's effects and the actuator of the mission, for a guess."""
         leg = replace(self.plan[index], actuator=None) if type(self.plan[index]) is Leg else self.plan[index]
-        problem = self._of_leg(leg, start, goal, Share(self.objective, True), duration, self.leg_names[index])
+        problem = self._of_leg(leg, start, goal, Share(self.objective), duration, self.leg_names[index])
         return replace(problem, start_time=start_time)
 
     def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:

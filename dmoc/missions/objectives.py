@@ -25,10 +25,9 @@ class DeltaV(Objective):
 
 @dataclass(frozen=True)
 class Share(Objective):
-    """What one leg adds to the objective of a mission; the cost of the goal belongs to the last leg alone."""
+    """What a leg adds to the objective of a mission: all but the cost of the goal, which belongs to its joint."""
 
     whole: Objective
-    last: bool
 
     @property
     def sense(self) -> int:  # type: ignore[override]
@@ -43,9 +42,6 @@ class Share(Objective):
 
     def rate(self, actuator: Actuator, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         return self.whole.rate(actuator, t, q, v, u, m)
-
-    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        return self.whole.terminal(t, q, v, m) if self.last else 0
 
     def unit_with(self, actuator: Actuator) -> str:
         return self.whole.unit_with(actuator)

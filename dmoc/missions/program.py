@@ -76,6 +76,7 @@ class MissionProgram:
     row_bounds: tuple[np.ndarray, np.ndarray]
     blocks: tuple[Block, ...]
     cost: float
+    leg_blocks: int
     drop: int = -1
 
     @classmethod
@@ -89,7 +90,7 @@ class MissionProgram:
             legs.append(Placed(program, *map(int, at)))
             blocks += [block.moved(*map(int, at)) for block in mine]
             at += (program.columns.size, program.rows.size, parameters)
-        columns, first_row = int(at[0]), int(at[1])
+        columns, first_row, leg_blocks = int(at[0]), int(at[1]), len(blocks)
         own, rows, writers, bounds = {}, Layout(), [], []
         for joint in mission.joints:
             beside = legs[joint.right if joint.left is None else joint.left].program  # type: ignore[index]
@@ -103,13 +104,13 @@ class MissionProgram:
         drop = _row_to_drop(mission, path)
         whole, places, expressions = _whole_rows(mission, legs, drop)
         rows = _add(rows, WHOLE, whole, _largest([leg.program.units for leg in legs]), bounds)
-        blocks += [writer.written(rows, first_row) for writer in writers if writer.rows]
+        blocks += [writer.written(rows, first_row) for writer in writers if writer.rows or not ca.SX(writer.cost).is_zero()]
         if whole:
             none = ca.SX(0, 1)
             made = kernel("mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
-        return cls(mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, drop)
+        return cls(mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, leg_blocks, drop)
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -260,15 +261,28 @@ class MissionProgram:
             return f"{found[0]}: {found[1].name_of(place - found[2])}"
         return self.rows.name_of(place - self.first_row)
 
-    def violations(self, answer: Answer, count: int = 10) -> list[tuple[str, float, str]]:
-        """The most violated rows and bounds, worst first: name, size and unit."""
+    def worst(self, x: np.ndarray, g: np.ndarray, count: int = 10) -> list[tuple[str, float, str]]:
+        """The most violated rows and bounds, worst first: name, size and unit; a row without a unit is scaled."""
         lbx, ubx, lbg, ubg = self.bounds()
         found = []
-        for values, low, high, column in ((answer.x, lbx, ubx, True), (answer.g, lbg, ubg, False)):
+        for values, low, high, column in ((x, lbx, ubx, True), (g, lbg, ubg, False)):
             excess = np.nan_to_num(np.maximum(low - values, values - high), nan=np.inf)
             found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
         found.sort(reverse=True)
         return [(self.name_of(place, column), size, "scaled") for size, place, column in found[:count]]
+
+    def costs(self, x: np.ndarray) -> list[float]:
+        """What each leg costs, without what belongs to joints, as it is minimised [unit of the objective]."""
+        values, parameters = x * self.column_scales(), self.parameters()
+        ends = [leg.columns for leg in self.legs[1:]] + [self.sizes[0]]
+        found = np.zeros(len(self.legs))
+        for block in self.blocks[: self.leg_blocks]:
+            known, constant = block.kernel.used
+            at = [block.first + place for place in constant]
+            given = values[block.columns], block.values[known], parameters[at]
+            mine = int(np.searchsorted(ends, block.columns.min(), side="right"))
+            found[mine] += float(ca.sum2(block.kernel.functions["cost"](*given)))
+        return found.tolist()
 
 
 def _leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:

@@ -196,8 +196,12 @@ def rollout(
         count = min(PIECE, steps - begin)
         if count < PIECE and begin:
             march = advance.mapaccum(count)
-        pieces = [value.reshape(len(value), steps, -1)[:, begin : begin + count] for value in inputs]
-        found = march(states[:, begin], *(piece.reshape(len(piece), -1) for piece in pieces))
+        widths = [value.shape[1] // steps for value in inputs]
+        pieces = [
+            value.reshape(len(value), steps, wide)[:, begin : begin + count].reshape(len(value), count * wide)
+            for value, wide in zip(inputs, widths, strict=True)
+        ]
+        found = march(states[:, begin], *pieces)
         states[:, begin + 1 : begin + count + 1] = found
     return states[:n].T + path.position[0], states[n:count_of_states].T
 
@@ -226,7 +230,10 @@ def _inputs(path: DiscretePath, start_time: float) -> list[np.ndarray]:
     """Masses, controls, begin and length of all steps, side by side."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
     at = step_nodes(steps, rule)
-    control = path.control if path.hold else path.control[at.T].reshape(steps * (rule.degree + 1), -1)
+    control = path.control if path.hold else path.control[at.T].reshape(at.size, path.control.shape[1])
+    if not control.shape[1]:
+        # Columns of no control would not be told apart.
+        control = np.zeros((0, 0))
     times = start_time + path.duration * path.mesh[:-1]
     lengths = path.duration * np.diff(path.mesh)
     if np.array_equal(path.mesh, uniform_mesh(steps)):

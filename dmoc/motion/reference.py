@@ -98,7 +98,12 @@ def reference(
 
 
 def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
-    """Controls of every piece as a polynomial in its fraction, shape (size (s+1), pieces), and their mesh."""
+    """Controls of every piece as a polynomial in its fraction, shape (size (s+1), pieces), and their mesh.
+
+    Without a control there is a row of zeros in their place.
+    """
+    if not path.control.shape[1]:
+        return np.zeros((1, len(path.mesh) - 1)), path.mesh
     if path.hold:
         return path.control.T, path.mesh
     known = flown(dynamics, path)
@@ -140,7 +145,8 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", states)
 
     def rate(fraction, y):
-        u = sum(powers[count * p : count * (p + 1)] * fraction**p for p in range(size // count))
+        degrees = range(size // count if count else 0)
+        u = sum((powers[count * p : count * (p + 1)] * fraction**p for p in degrees), ca.SX.zeros(count))
         q, v, flow = y[:n] + origin, y[n:-1], dynamics.actuator.flow(u)
         push = dynamics.acceleration(t + fraction * h, q, v, y[-1], dynamics.wrench(q, u))
         return ca.vertcat(dynamics.configuration.velocity(q, v), push, 0 if flow is None else -flow)

@@ -114,7 +114,8 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     q, origin = (ca.SX.sym(name, n) for name in ("q", "origin"))
     p = ca.SX.sym("p", dynamics.freedom)
     t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)
-    u = ca.SX.sym("u", dynamics.controls, 1 if hold else s + 1)
+    # Without a control the columns of none are not told apart when steps are mapped, so there are none.
+    u = ca.SX.sym("u", dynamics.controls, (1 if hold else s + 1) * (dynamics.controls > 0))
     given = [q, p, masses, u, t, h, origin]
     names = ["q", "p", "m", "u", "t", "h", "origin"]
     m = ca.vertsplit(masses)
@@ -123,7 +124,8 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
         return dynamics.point(t, r + origin, v, m)
 
     def push(positions: Sequence) -> list:
-        at = [(positions[j] + origin, u[:, 0 if hold else j], m[j]) for j in range(s + 1)]
+        controls = [u[:, 0 if hold else j] if dynamics.controls else u for j in range(s + 1)]
+        at = [(positions[j] + origin, controls[j], m[j]) for j in range(s + 1)]
         return [body.driven(dynamics.actuator, place, control, mass) for place, control, mass in at]
 
     rate = dynamics.velocity(t, q + origin, p, m[0])

@@ -67,7 +67,7 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
         change = max(change, float(np.linalg.norm(turns, axis=1).max()))
     typical = problem.mass * change / time
     limit = problem.actuator.force_limit()
-    forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)])
+    forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)], bool)
     force = float(np.abs(guess.control[:, forces]).max(initial=0.0)) if guess.multipliers else 0.0
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
@@ -88,7 +88,7 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     """
     if not problem.turns:
         return without
-    turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)])
+    turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)], bool)
     used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
     scales = path_scales(guess)
     moment, fastest = problem.moment, max(scales.turn / guess.duration, scales.rate)

@@ -123,7 +123,7 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
         control = path.control.T
         if not path.hold:
             control = np.einsum("ij,jkn->nki", rule.values_at(fractions), path.control[at])
-            control = control.reshape(control.shape[0], -1)
+            control = control.reshape(control.shape[0], control.shape[1] * control.shape[2])
         mass = rule.values_at(fractions) @ path.mass[at]
         times = start_time + path.duration * path.mesh[:-1] + 0.5 * half * h
         q, p = (now[:, :n] - origin).T, now[:, n:].T

@@ -52,14 +52,24 @@ BETWEEN = (
 
 def write(solution: Any, path: str | os.PathLike) -> None:
     """Write a Solution to a netCDF-4 file, whole or not at all."""
-    write_table(path, _attributes(solution), _variables(solution))
+    write_table(path, *solution_parts(solution))
+
+
+def solution_parts(solution: Any, plain: bool = False) -> tuple[dict[str, Any], Table]:
+    """Attributes and variables of a solution; without variables if `plain`."""
+    return _attributes(solution), {} if plain else _variables(solution)
+
+
+def solution_of(facts: dict[str, Any], table: Table, make: Callable) -> Any:
+    """The solution of attributes and variables that fit together; `make` takes the arguments of Solution."""
+    return _check_shapes(_solution(facts, table, make))
 
 
 def read(path: str | os.PathLike, make: Callable) -> Any:
     """The solution in a file, without its problem; `make` takes the arguments of Solution."""
     facts, table = read_table(path, SOLUTION_FILE)
     try:
-        return _check_shapes(_solution(facts, table, make))
+        return solution_of(facts, table, make)
     except KeyError as error:
         raise ValueError(f"{path} is damaged: it lacks the attribute {error}; {AGAIN}") from None
     except (TypeError, ValueError, AttributeError) as error:
@@ -189,7 +199,7 @@ def _attributes(solution: Any) -> dict[str, Any]:
         "start_time": about.start_time,
         "time_unit": "s",
         "objective_unit": about.objective_unit,
-        "hold": int(solution.hold),
+        "hold": int(getattr(solution, "hold", False)),
         "success": int(solution.success),
         **{name: getattr(solution, name) for name in plain.split()},
         **{name: _text(value) for name, value in texts.items()},

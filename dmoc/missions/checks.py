@@ -1,0 +1,156 @@
+"""The checks of a mission: those of every leg, of every joint, of the whole, and the primer vector's verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.checks.evidence import Evidence
+from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report
+from dmoc.missions.mission import Mission
+from dmoc.missions.program import MissionProgram
+from dmoc.missions.solution import MissionSolution
+
+# States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
+JOINED = 1e-8
+# Another impulse helps if the primer vector is longer than its length at impulses by this part [-].
+HELPS = 1e-4
+
+
+def verify_mission(solution: MissionSolution) -> Report:
+    """Check a mission, without a look at the optimiser's own verdict on it.
+
+    Every leg is checked as a transfer between its two states, and the worst one is told; `joints` compares the
+    states, times and masses beside each joint and what must hold there; `optimality` are the first-order
+    conditions of the whole mission; `primer` says whether another impulse would help.
+    """
+    begun, mission = time.perf_counter(), solution.require_problem()
+    with np.errstate(all="ignore"):
+        legs = [Evidence(replace(leg, tolerance=solution.tolerance)) for leg in solution.legs]
+        undefined = next((found for leg in legs if (found := leg.undefined())), "")
+        if undefined:
+            return Report((Check("legs", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
+        held = any(leg.path.attitudes or leg.problem.links for leg in legs)
+        checks = [
+            _worst(mission, legs, check)
+            for name, check in CHECKS.items()
+            if name != "optimality" and (held or name != "constraint")
+        ]
+        whole = _Whole(solution)
+        checks += [whole.joints(), whole.optimality()]
+        if solution.impulses:
+            checks.append(primer_check(solution))
+    return Report(tuple(checks), time.perf_counter() - begun)
+
+
+def _worst(mission: Mission, legs: Sequence[Evidence], check: Callable[[Evidence], Check]) -> Check:
+    """The check of the leg in which it is nearest to its limit, or beyond it."""
+    found = [check(leg) for leg in legs]
+
+    def share(one: Check) -> float:
+        if one.value is None:
+            return -1.0
+        if not one.ok:
+            return np.inf
+        return one.value / one.limit if one.limit else 0.0
+
+    worst = int(np.argmax([share(one) for one in found]))
+    if len(legs) == 1:
+        return found[0]
+    name = mission.leg_names[worst]
+    return replace(found[worst], note=f"{name}: {found[worst].note}" if found[worst].note else name)
+
+
+class _Whole:
+    """The program of a mission on its own meshes, evaluated block by block at its solution."""
+
+    def __init__(self, solution: MissionSolution):
+        self.solution = solution
+        mission, path = solution.require_problem(), solution.path
+        program = MissionProgram.of(mission, mission.stretches, path)
+        self.program = program
+        self.x = program.pack(path)
+        lam_x, lam_g = program.multipliers(path)
+        scales, row_scales = program.column_scales(), program.row_scales()
+        values, parameters = self.x * scales, program.parameters()
+        dual = lam_g * row_scales * program.cost
+        slope, self.rows, self.cost = np.zeros(len(values)), np.zeros(len(lam_g)), 0.0
+        for block in program.blocks:
+            known, used = block.kernel.used
+            given = values[block.columns], block.values[known], parameters[[block.first + p for p in used]]
+            found = block.kernel.slope(*given, dual[block.targets], 1.0)
+            np.add.at(slope, block.columns, found[0].full())
+            np.add.at(self.rows, block.targets, found[1].full())
+            self.cost += float(found[2].full().sum())
+        self.slope = slope * scales / program.cost + lam_x
+        self.rows = self.rows * row_scales
+        self.lam_x, self.lam_g = lam_x, lam_g
+
+    def joints(self) -> Check:
+        """States, times and masses beside each joint, and the conditions of start, goal and events."""
+        lbx, ubx, low, high = self.program.bounds()
+        first = self.program.first_row
+        excess = np.maximum(low - self.rows, self.rows - high)[first:]
+        outside = np.maximum(lbx - self.x, self.x - ubx)
+        if not len(excess):
+            return Check("joints", None, None, "-", True, "there is none")
+        # Times at the start and masses are bounds of the legs.
+        worst, place = float(excess.max()), int(np.argmax(excess))
+        name = self.program.rows.name_of(place)
+        if outside.max() > worst:
+            worst, name = float(outside.max()), self.program.name_of(int(np.argmax(outside)), column=True)
+        return Check.of("joints", worst, JOINED, "of its unit", f"worst: {name}" if worst > 0 else "all hold")
+
+    def optimality(self) -> Check:
+        """First-order conditions of the mission, and whether the objective is the cost of the path."""
+        program, lbx_ubx = self.program, self.program.bounds()
+        left, limits = 0.0, 0.0
+        for placed in program.legs:
+            layout = placed.program.columns
+            mine = self.slope[placed.columns : placed.columns + layout.size]
+            for group in layout.groups:
+                part = group.of(mine)
+                if group.kind == "control":
+                    weights = np.maximum(np.gradient(np.linspace(0, 1, max(group.count, 2)))[: group.count], 1e-3)
+                    left = max(left, float(np.abs(part / weights[:, None]).max(initial=0.0)))
+                else:
+                    left = max(left, float(np.abs(np.cumsum(part, axis=0)).max(initial=0.0)))
+        rest = self.slope[program.legs[-1].columns + program.legs[-1].program.columns.size :]
+        left = max(left, float(np.abs(rest).max(initial=0.0)))
+        for multipliers, values, lower, upper in (
+            (self.lam_x, self.x, *lbx_ubx[:2]),
+            (self.lam_g, self.rows, *lbx_ubx[2:]),
+        ):
+            room = np.where(multipliers > 0, upper - values, values - lower)
+            product = np.abs(multipliers) * np.clip(room, 0.0, 1.0)
+            product[lower == upper] = 0.0
+            limits = max(limits, float(product.max(initial=0.0)))
+        sense = self.solution.require_problem().objective.sense
+        stated = abs(self.cost - sense * self.solution.objective) / program.cost
+        note = f"path and control {left:.0e}, limits {limits:.0e}, objective {stated:.0e}"
+        return Check.of("optimality", max(left, limits, stated), OPTIMALITY, "-", note)
+
+
+def primer_check(solution: MissionSolution) -> Check:
+    """Whether another impulse would help: where the primer vector is longer than at the impulses (Lawden, 1963)."""
+    times, sizes = solution.primer
+    worth = worth_of(solution)
+    if worth is None:
+        return Check("primer", None, None, "-", True, "the objective does not count velocity changes alone")
+    place = int(np.argmax(sizes))
+    longest = float(sizes[place]) / worth
+    if longest <= 1 + HELPS:
+        return Check("primer", longest, None, "-", True, "no further impulse would help")
+    note = f"another impulse near {times[place]:.6g} s would help: {longest - 1:.2g} m/s saved for each m/s there"
+    return Check("primer", longest, None, "-", True, note)
+
+
+def worth_of(solution: MissionSolution) -> float | None:
+    """What 1 m/s costs by the objective, where only impulses are paid for; else None."""
+    objective = solution.require_problem().objective
+    terms: Any = [(weight, term) for weight, term in objective.terms if weight]
+    return float(terms[0][0]) if len(terms) == 1 and float(terms[0][1].kick(1.0, 1.0)) == 1.0 else None
