@@ -70,6 +70,16 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import Pose as Pose
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
+    from dmoc.legs.ends import Free as Free
+    from dmoc.legs.ends import Periodic as Periodic
+    from dmoc.legs.events import Bounce as Bounce
+    from dmoc.legs.events import Coast as Coast
+    from dmoc.legs.events import Drop as Drop
+    from dmoc.legs.events import Frame as Frame
+    from dmoc.legs.events import Impulse as Impulse
+    from dmoc.legs.events import Leg as Leg
+    from dmoc.legs.events import Via as Via
+    from dmoc.legs.objectives import DeltaV as DeltaV
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.joint import Joint as Joint
     from dmoc.links.joint_limits import JointLimit as JointLimit
@@ -88,6 +98,9 @@ if TYPE_CHECKING:
     from dmoc.links.springs import JointSpring as JointSpring
     from dmoc.links.system import Member as Member
     from dmoc.links.system import System as System
+    from dmoc.missions.files import load as load
+    from dmoc.missions.mission import Mission as Mission
+    from dmoc.missions.solution import MissionSolution as MissionSolution
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate
     from dmoc.nlp.solving import NLP as NLP
@@ -100,6 +113,7 @@ if TYPE_CHECKING:
     from dmoc.parts.forces import BallForce as BallForce
     from dmoc.parts.forces import BoxForce as BoxForce
     from dmoc.parts.forces import FreeForce as FreeForce
+    from dmoc.parts.forces import Unpowered as Unpowered
     from dmoc.parts.objectives import Effort as Effort
     from dmoc.parts.objectives import FinalHeight as FinalHeight
     from dmoc.parts.objectives import FinalMass as FinalMass
@@ -114,7 +128,6 @@ if TYPE_CHECKING:
     from dmoc.parts.zones import KeepIn as KeepIn
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
-    from dmoc.results.solution import load as load
     from dmoc.scene.problem import TransferProblem as TransferProblem
     from dmoc.solver.solve import solve as solve
     from dmoc.studies.accuracy import Formulation as Formulation

@@ -76,10 +76,11 @@ def show(name: Name, settings: Settings = None) -> None:
     from dmoc.solver.meshes import first_path
 
     file, problem = problem_of(name, settings)
-    guess = first_path(problem)
-    nlp = transcribe_onto(problem, guess, units_of(problem, guess))
     console = report.console()
-    tables = (report.scene(problem), report.parameters(file.parameters), report.sizes(nlp))
+    tables = [report.scene(problem), report.parameters(file.parameters)]
+    if not hasattr(problem, "plan"):
+        guess = first_path(problem)
+        tables.append(report.sizes(transcribe_onto(problem, guess, units_of(problem, guess))))
     for part in (report.prose(file.docstring), *tables):
         console.print(part, "", sep="\n")
     console.print(f"{file.path}; solve it with: dmoc solve {name}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
-from dmoc.missions.ends import Periodic
+from dmoc.legs.ends import Periodic
 from dmoc.missions.mission import Mission
 from dmoc.missions.program import MissionPath
 from dmoc.motion.lobatto import scheme

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.configurations.base import Configuration
-from dmoc.missions.legs import Instant, condition_rows
+from dmoc.legs.events import Instant, condition_rows
 from dmoc.missions.mission import Joint, Mission
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout

@@ -11,9 +11,9 @@ from typing import Any
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
-from dmoc.missions.ends import Free, Loose, Periodic
-from dmoc.missions.legs import Event, Impulse, Leg
-from dmoc.missions.objectives import Share
+from dmoc.legs.ends import Free, Loose, Periodic
+from dmoc.legs.events import Event, Impulse, Leg
+from dmoc.legs.objectives import Share
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
@@ -246,7 +246,7 @@ class Mission:
 
     def _check_impulses(self) -> None:
         """Impulses without a limit must cost something, and the objective must be able to say what."""
-        from dmoc.missions.objectives import DeltaV
+        from dmoc.legs.objectives import DeltaV
         from dmoc.parts.objectives import FinalMass, Fuel
 
         impulses = [part for part in self.legs if isinstance(part, Impulse)]
@@ -263,6 +263,12 @@ class Mission:
                     f"an impulse without a limit costs nothing with {', '.join(sorted(t.__name__ for t in sought))}; "
                     "use objective=DeltaV(), or Impulse(limit=...) [m/s]"
                 )
+
+    def solve_legs(self, **numerics: Any) -> Any:
+        """What `dmoc.solve` does with a mission; the arguments are its own."""
+        from dmoc.missions.climb import solve_mission
+
+        return solve_mission(self, **numerics)
 
     def span(
         self, index: int, start: Boundary, goal: Boundary, start_time: float, duration: float

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.ends import Periodic
+from dmoc.legs.ends import Periodic
 from dmoc.missions.joining import JointWriter, Placed, own_unknowns
 from dmoc.missions.mission import Joint, Mission
 from dmoc.motion.dynamics import Dynamics
@@ -54,6 +54,26 @@ class MissionPath:
     def warm(self) -> bool:
         """Whether there are multipliers to start from."""
         return all(leg.multipliers for leg in self.legs)
+
+    @property
+    def place(self) -> np.ndarray:
+        """Places at the nodes of all legs [m]."""
+        return np.concatenate([leg.place for leg in self.legs])
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box around the path [m]."""
+        return float(np.linalg.norm(np.ptp(self.place, axis=0)))
+
+    @property
+    def attitudes(self) -> list[np.ndarray]:
+        """The attitudes of each body that turns in the first leg."""
+        return self.legs[0].attitudes
+
+    @property
+    def turn(self) -> float:
+        """The largest angle that a body is turned by in a leg [rad]."""
+        return max(leg.turn for leg in self.legs)
 
     def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> MissionPath:
         """The same on other meshes and orders, one pair a leg."""

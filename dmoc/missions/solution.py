@@ -185,6 +185,12 @@ class MissionSolution:
         ]
         return replace(self, problem=problem, legs=tuple(legs))
 
+    def verify_legs(self) -> Any:
+        """What `dmoc.verify` does with the solution of a mission."""
+        from dmoc.missions.checks import verify_mission
+
+        return verify_mission(self)
+
     def save(self, path: str | os.PathLike, **provenance: Any) -> None:
         """Write the solution to a netCDF-4 file, whole or not at all; `provenance` as of a `Solution`."""
         whole = replace(self, provenance=replace(self.provenance, **provenance))

@@ -46,6 +46,10 @@ def console(stderr: bool = False) -> Console:
 
 def scene(problem: TransferProblem) -> RenderableType:
     """What is to be done, in words."""
+    if hasattr(problem, "plan"):
+        from dmoc.reports.missions import mission_scene
+
+        return mission_scene(problem)
     shortest, longest = problem.duration_bounds
     free = f"free between {lasting(shortest, 6)} and {lasting(longest, 6)}"
     return pairs(
@@ -175,7 +179,8 @@ def answer(
     if quiet:
         return last
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
-    return Group(*_ladder_lines(solution), *_estimate(solution), Text(), *verdicts, *_file_lines(written), last)
+    above = [*_ladder_lines(solution), *_estimate(solution), Text(), *_legs(solution)]
+    return Group(*above, *verdicts, *_file_lines(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:
@@ -252,6 +257,15 @@ def live_line(unit: str) -> Iterator[Callable | None]:
             return False
 
         yield progress
+
+
+def _legs(solution: Any) -> list[RenderableType]:
+    """The legs and impulses of a mission; nothing of a transfer."""
+    if not hasattr(solution, "impulses"):
+        return []
+    from dmoc.reports.missions import legs_table
+
+    return [legs_table(solution), Text()]
 
 
 def _ladder_lines(solution: Solution) -> list[RenderableType]:

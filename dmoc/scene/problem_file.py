@@ -79,9 +79,10 @@ class ProblemFile:
         for name, value in values.items():
             _check_type(name, value, self.parameter(name).default)
         made = _guarded(self.path, lambda: self.function(**values))
-        if not isinstance(made, TransferProblem):
+        if not (isinstance(made, TransferProblem) or hasattr(made, "solve_legs")):
             raise ValueError(
-                f"{self.path}: {FUNCTION}() must return a dmoc.TransferProblem; it returned {_short(made)}"
+                f"{self.path}: {FUNCTION}() must return a dmoc.TransferProblem or a dmoc.Mission; "
+                f"it returned {_short(made)}"
             )
         chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
         return replace(made, name=self.name, parameters=chosen)

@@ -1,0 +1,1 @@
+"""Parts of missions: legs, what happens between them, their ends and objectives."""
