@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from dmoc.checks.evidence import Evidence as Evidence
     from dmoc.checks.verification import Check as Check
     from dmoc.checks.verification import Report as Report
-    from dmoc.checks.verification import verify as verify
     from dmoc.effects import J2 as J2
     from dmoc.effects import Atmosphere as Atmosphere
     from dmoc.effects import Body as Body
@@ -73,12 +72,12 @@ if TYPE_CHECKING:
     from dmoc.legs.ends import Free as Free
     from dmoc.legs.ends import Periodic as Periodic
     from dmoc.legs.events import Bounce as Bounce
-    from dmoc.legs.events import Coast as Coast
     from dmoc.legs.events import Drop as Drop
     from dmoc.legs.events import Frame as Frame
     from dmoc.legs.events import Impulse as Impulse
-    from dmoc.legs.events import Leg as Leg
     from dmoc.legs.events import Via as Via
+    from dmoc.legs.legs import Coast as Coast
+    from dmoc.legs.legs import Leg as Leg
     from dmoc.legs.objectives import DeltaV as DeltaV
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.joint import Joint as Joint
@@ -98,8 +97,9 @@ if TYPE_CHECKING:
     from dmoc.links.springs import JointSpring as JointSpring
     from dmoc.links.system import Member as Member
     from dmoc.links.system import System as System
-    from dmoc.missions.files import load as load
-    from dmoc.missions.mission import Mission as Mission
+    from dmoc.missions.front import load as load
+    from dmoc.missions.front import solve as solve
+    from dmoc.missions.front import verify as verify
     from dmoc.missions.solution import MissionSolution as MissionSolution
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.motion.march import simulate as simulate
@@ -128,8 +128,8 @@ if TYPE_CHECKING:
     from dmoc.parts.zones import KeepIn as KeepIn
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
+    from dmoc.scene.mission import Mission as Mission
     from dmoc.scene.problem import TransferProblem as TransferProblem
-    from dmoc.solver.solve import solve as solve
     from dmoc.studies.accuracy import Formulation as Formulation
     from dmoc.studies.accuracy import work_precision as work_precision
     from dmoc.studies.drift import drift as drift

@@ -109,8 +109,6 @@ def verify(
         If the solution has no problem and none is given, or one that does not fit it; if one of `more`
         gives no `Check`, or one whose name is taken.
     """
-    if (by_legs := getattr(solution, "verify_legs", None)) is not None:
-        return by_legs() if problem is None else solution.attach(problem).verify_legs()  # type: ignore[arg-type]
     of_kind("solution", solution, Solution)
     if problem is not None:
         solution = solution.attach(problem)

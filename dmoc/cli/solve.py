@@ -73,7 +73,7 @@ def solve(
         with watched(as_json or quiet, unit) as progress:
             numerics = order, steps, tol, hold, None, start, None
             solution = dmoc.solve(problem, *numerics, progress, compiled, time_limit)
-        from dmoc.checks.verification import verify
+        from dmoc.missions.front import verify
 
         verdict = verify(solution) if solution.optimal else None
     if out is not None:

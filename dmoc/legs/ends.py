@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class Free(Boundary):
     """
 
     axes: int = 0
+    # Whether the state is that of the start once more.
+    closes: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         whole("Free: axes", self.axes, least=0)
@@ -46,6 +48,8 @@ class Periodic(Free):
 
     Where the motion keeps an energy one velocity follows from the others, and is not asked for again.
     """
+
+    closes: ClassVar[bool] = True
 
     def words(self) -> str:
         return "the state of the start, so that the path closes"

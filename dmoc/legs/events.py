@@ -1,66 +1,18 @@
-"""Legs of a mission, and what happens between them."""
+"""What happens between two legs of a mission."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import checked, entries, number, short, whole
-from dmoc.ends.base import Boundary
-from dmoc.parts.forces import Unpowered
+from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
-
-
-@dataclass(frozen=True)
-class Leg:
-    """A part of a mission, with its own forces, limits and duration. What is not given is the mission's.
-
-    Parameters
-    ----------
-    duration : float or (float, float), optional
-        [s]; a pair (shortest, longest) leaves it free between the two. Without one it is free within the
-        duration of the mission.
-    effects, constraints : sequence, optional
-        What acts on the body, and the limits on its way, in this leg.
-    actuator : Actuator, optional
-        What pushes it in this leg.
-    order, steps : int, optional
-        Order of the scheme and number of steps of this leg.
-    name : str
-        Its name in messages, tables and pictures.
-    """
-
-    duration: Any = None
-    effects: Sequence | None = None
-    actuator: Any = None
-    constraints: Sequence | None = None
-    order: int | None = None
-    steps: int | None = None
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
-        if self.steps is not None:
-            whole("Leg: steps", self.steps, least=2)
-        if self.order not in (None, 2, 4, 6, 8):
-            raise ValueError(f"Leg: order must be 2, 4, 6 or 8; got {short(self.order)}")
-
-
-@dataclass(frozen=True)
-class Coast(Leg):
-    """A leg without thrust: it has no controls at all."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.actuator is not None:
-            raise ValueError("Coast: there is no actuator in a coast; use Leg(duration, actuator=...)")
-        checked(self, actuator=Unpowered())
 
 
 class Instant(NamedTuple):
@@ -210,8 +162,6 @@ class Via(Event):
     def __post_init__(self) -> None:
         place = entries(self.boundary)
         if place is not None:
-            from dmoc.ends.base import State
-
             checked(self, boundary=State(tuple(place), None))
         if not isinstance(self.boundary, Boundary):
             raise ValueError(

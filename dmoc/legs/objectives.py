@@ -25,7 +25,7 @@ class DeltaV(Objective):
 
 @dataclass(frozen=True)
 class Share(Objective):
-    """What a leg adds to the objective of a mission: all but the cost of the goal, which belongs to its joint."""
+    """What a leg adds to the objective of a mission: all but the cost at the goal."""
 
     whole: Objective
 

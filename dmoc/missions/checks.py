@@ -1,4 +1,4 @@
-"""The checks of a mission: those of every leg, of every joint, of the whole, and the primer vector's verdict."""
+"""The checks of a mission: of every leg, of every joint, of the whole, and the primer vector's verdict."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report
-from dmoc.missions.mission import Mission
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
+from dmoc.scene.mission import Mission
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8
@@ -21,13 +21,16 @@ JOINED = 1e-8
 HELPS = 1e-4
 
 
-def verify_mission(solution: MissionSolution) -> Report:
+def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequence = ()) -> Report:
     """Check a mission, without a look at the optimiser's own verdict on it.
 
     Every leg is checked as a transfer between its two states, and the worst one is told; `joints` compares the
     states, times and masses beside each joint and what must hold there; `optimality` are the first-order
     conditions of the whole mission; `primer` says whether another impulse would help.
     """
+    if more:
+        raise ValueError("a mission takes no checks of your own yet; verify(solution.legs[k], more=...) does")
+    solution = solution if problem is None else solution.attach(problem)
     begun, mission = time.perf_counter(), solution.require_problem()
     with np.errstate(all="ignore"):
         legs = [Evidence(replace(leg, tolerance=solution.tolerance)) for leg in solution.legs]
@@ -115,7 +118,9 @@ class _Whole:
             for group in layout.groups:
                 part = group.of(mine)
                 if group.kind == "control":
-                    weights = np.maximum(np.gradient(np.linspace(0, 1, max(group.count, 2)))[: group.count], 1e-3)
+                    weights = np.maximum(
+                        np.gradient(np.linspace(0, 1, max(group.count, 2)))[: group.count], 1e-3
+                    )
                     left = max(left, float(np.abs(part / weights[:, None]).max(initial=0.0)))
                 else:
                     left = max(left, float(np.abs(np.cumsum(part, axis=0)).max(initial=0.0)))
@@ -136,7 +141,7 @@ class _Whole:
 
 
 def primer_check(solution: MissionSolution) -> Check:
-    """Whether another impulse would help: where the primer vector is longer than at the impulses (Lawden, 1963)."""
+    """Whether another impulse would help: the primer vector is longer there than at impulses (Lawden, 1963)."""
     times, sizes = solution.primer
     worth = worth_of(solution)
     if worth is None:
@@ -145,7 +150,9 @@ def primer_check(solution: MissionSolution) -> Check:
     longest = float(sizes[place]) / worth
     if longest <= 1 + HELPS:
         return Check("primer", longest, None, "-", True, "no further impulse would help")
-    note = f"another impulse near {times[place]:.6g} s would help: {longest - 1:.2g} m/s saved for each m/s there"
+    note = (
+        f"another impulse near {times[place]:.6g} s would help: {longest - 1:.2g} m/s saved for each m/s there"
+    )
     return Check("primer", longest, None, "-", True, note)
 
 

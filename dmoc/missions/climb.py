@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import whole
-from dmoc.basics.digits import lasting
+from dmoc.missions.answer import answered
 from dmoc.missions.guess import guessed
-from dmoc.missions.mission import Mission
-from dmoc.missions.program import MissionPath, MissionProgram, kicks_of
-from dmoc.missions.solution import Kick, MissionSolution
+from dmoc.missions.path import MissionPath, finer
+from dmoc.missions.program import MissionProgram
+from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.march import force_of
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.motion.momenta import end_momenta
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
-from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch
+from dmoc.nlp.ipopt import Answer, Interrupt, Watch
 from dmoc.results.estimate import local_errors
-from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution, reported
+from dmoc.results.facts import Error, Level
+from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import A_TURN, UNEVEN, WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
@@ -63,8 +60,9 @@ class Attempt:
 class Climb:
     """The attempts at one mission, in their order."""
 
-    def __init__(self, mission: Mission, options: Any, progress: Any, time_limit: float | None, hold: bool):
-        self.mission, self.options, self.progress, self.hold = mission, options or {}, progress, hold
+    def __init__(self, mission: Mission, options: Any, progress: Any, compiled: bool, time_limit: float | None):
+        self.mission, self.options, self.progress = mission, options or {}, progress
+        self.compiled = compiled
         self.interrupt = Interrupt(time_limit)
         self.levels: list[Level] = []
 
@@ -78,7 +76,7 @@ class Climb:
         watch = self._watch(program)
         limits = {} if most is None else {"ipopt.max_iter": most}
         built = time.perf_counter() - begun
-        answer = program.solve(path, limits | self.options, watch, carried)
+        answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
             raise watch.error
         steps = sum(len(leg.program.mesh) - 1 for leg in program.legs)
@@ -129,11 +127,25 @@ class Climb:
 
     def _stages(self) -> list[float | None]:
         """Widths of the rounding of |F|, from wide to what is asked for."""
-        own = [leg.actuator.smoothing for leg in self.mission.stretches if leg.actuator.smoothing is not None]
+        # An engine that always burns fully never comes to zero, where |F| is rounded.
+        engines = [leg.actuator for leg in self.mission.stretches]
+        own = [
+            one.smoothing
+            for one in engines
+            if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
+        ]
         if not own:
             return [None]
         count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / min(own)))), 0)
         return [*(WIDEST_ROUNDING * 0.1**i for i in range(count)), None]
+
+    def regraded(self, attempt: Attempt, meshes: list[tuple[np.ndarray, int]]) -> Attempt:
+        """The answer on meshes that suit the path found, where these are others."""
+        same = [
+            np.array_equal(leg.mesh, mesh) for leg, (mesh, _) in zip(attempt.path.legs, meshes, strict=True)
+        ]
+        again = attempt if all(same) else self.attempt(attempt.path.onto(meshes), carried=True)
+        return again if again.solved else attempt
 
     def refined(self, attempt: Attempt, tol: float | None) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`."""
@@ -144,15 +156,15 @@ class Climb:
             wanted = ACCURATE if tol is None else tol
             if tol is None and worst <= wanted:
                 break
-            finer = attempt.path.onto(_finer(attempt.path, errors))
-            if sum(len(leg.mesh) - 1 for leg in finer.legs) > MOST_STEPS:
+            onto = attempt.path.onto(finer(attempt.path, errors))
+            if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
-            found = self.attempt(finer, carried=True)
+            found = self.attempt(onto, carried=True)
             if not found.solved:
-                found = self.attempt(_cold(finer), carried=True)
+                found = self.attempt(_cold(onto), carried=True)
+            if found.answer.status == "stopped":
+                return found, error, False
             if not found.solved:
-                if found.answer.status == "stopped":
-                    return found, error, False
                 break
             changes.append(_change(attempt, found))
             attempt = found
@@ -164,7 +176,7 @@ class Climb:
         return attempt, error, tol is None
 
     def _error(self, attempt: Attempt, changes: list[float]) -> Error:
-        """Estimated errors: of the steps of a leg in sum, of the objective, and the integrator's miss of a leg."""
+        """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
         path, missed = attempt.path, 0.0
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
@@ -185,37 +197,41 @@ def solve_mission(
     steps: int | None = None,
     tol: float | None = None,
     hold: bool = False,
+    mesh: Any = None,
     guess: Any = None,
     options: dict[str, Any] | None = None,
     progress: Any = None,
+    compiled: bool = False,
     time_limit: float | None = None,
 ) -> MissionSolution:
     """Solve a mission; the arguments are those of `dmoc.solve`, and `steps` are those of each leg."""
     if steps is not None:
         whole("steps", steps, least=2)
-    climb = Climb(mission, options, progress, time_limit, hold)
-    given = mission.guess if guess is None else guess
-    given = getattr(given, "path", given)
-    if isinstance(given, MissionPath):
-        path = given
-        if order or steps:
-            path = given.onto(_meshes(mission, path, order, steps))
-    else:
-        coarse = [(uniform_mesh(leg.steps or steps or STEPS[leg.order or order or ORDER]), leg.order or order or ORDER) for leg in mission.plan]
-        path = guessed(mission, coarse, given)
-        if steps is None:
-            path = guessed(mission, _meshes(mission, path, order, steps), given)
+    if mesh is not None:
+        raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
+    climb = Climb(mission, options, progress, compiled, time_limit)
+    path = _first_path(mission, order, steps, hold, guess)
     with climb.interrupt:
         first = climb.attempt(path) if path.warm else climb.from_guess(path)
         if not first.solved:
-            return _answered(climb, first)
+            return answered(climb, first)
         if steps is None:
-            regraded = first.path.onto(_meshes(mission, first.path, order, steps))
-            if any(not np.array_equal(a.mesh, b.mesh) for a, b in zip(regraded.legs, first.path.legs, strict=True)):
-                again = climb.attempt(regraded, carried=True)
-                first = again if again.solved else first
-        found, error, met = (first, None, True) if steps and tol is None else climb.refined(first, tol)
-    return _answered(climb, found, tol, error, met)
+            first = climb.regraded(first, _meshes(mission, first.path, order, steps))
+        if steps is not None and tol is None:
+            return answered(climb, first)
+        return answered(climb, *climb.refined(first, tol), tol)
+
+
+def _first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
+    """The path to start from, on its first meshes."""
+    given = mission.guess if guess is None else guess
+    given = getattr(given, "path", given)
+    if isinstance(given, MissionPath):
+        return given.onto(_meshes(mission, given, order, steps)) if order or steps else given
+    orders = [leg.order or order or ORDER for leg in mission.plan]
+    counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
+    path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
+    return path if steps else guessed(mission, _meshes(mission, path, order, steps), hold, given)
 
 
 def _meshes(
@@ -238,23 +254,6 @@ def _meshes(
             mesh = np.interp(mesh, angles / angles[-1], at)
             mesh[0], mesh[-1] = 0.0, 1.0
         found.append((mesh, this))
-    return found
-
-
-def _finer(path: MissionPath, errors: Sequence[np.ndarray]) -> list[tuple[np.ndarray, int]]:
-    """Meshes on which the steps that make up the errors of all legs are cut in two."""
-    total = np.concatenate(errors)
-    order = np.argsort(total)
-    least = min(leg.order for leg in path.legs)
-    small = np.cumsum(total[order]) <= 0.5 * 2.0**-least * total.sum()
-    cut = np.ones(len(total), bool)
-    cut[order[small]] = False
-    found, at = [], 0
-    for leg in path.legs:
-        mine = cut[at : at + len(leg.mesh) - 1]
-        at += len(mine)
-        middles = 0.5 * (leg.mesh[1:] + leg.mesh[:-1])[mine]
-        found.append((np.sort(np.concatenate([leg.mesh, middles])), leg.order))
     return found
 
 
@@ -287,98 +286,3 @@ def _stretched(mission: Mission, path: MissionPath, factor: float) -> MissionPat
         legs.append(replace(leg, duration=duration))
     begins = path.begins[0] + np.append(0.0, np.cumsum([leg.duration for leg in legs]))[:-1]
     return replace(path, legs=tuple(legs), begins=tuple(float(t) for t in begins))
-
-
-def _answered(
-    climb: Climb, attempt: Attempt, tol: float | None = None, error: Error | None = None, met: bool = True
-) -> MissionSolution:
-    """The answer of an attempt as a MissionSolution."""
-    mission, program, answer = climb.mission, attempt.program, attempt.answer
-    path, status = attempt.path, answer.status
-    costs = program.costs(answer.x)
-    about = Provenance(
-        mission.name, mission.parameters, path.begins[0], mission.objective.unit_with(mission.actuator)
-    )
-    legs = tuple(
-        _leg_solution(mission, i, path, costs[i], status, climb.levels[-1]) for i in range(len(path.legs))
-    )
-    if status == "solved":
-        message, success = "a local optimum", True
-    else:
-        message, success = STATUSES[status].advice, False
-    if status == "stopped" and climb.interrupt.late:
-        status = OUT_OF_TIME
-        message = STATUSES[OUT_OF_TIME].advice
-    if success and not met:
-        status, success = NOT_MET, False
-        reached = "unknown" if error is None else f"{error.largest:.1e}"
-        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
-    impulses = _impulses(mission, path, legs)
-    mass = float(path.legs[-1].mass[-1])
-    sizes = [kick.size for kick in impulses if kick.joint == "goal"]
-    for event in mission.joints[-1].events:
-        mass = event.burnt(mass, sizes.pop(0) if event.unknowns(1) else 0.0)
-    return MissionSolution(
-        mission,
-        legs,
-        impulses,
-        path.own,
-        path.forces,
-        attempt.level.objective,
-        mass,
-        success,
-        status,
-        message,
-        tuple(climb.levels),
-        worst=() if success else tuple(program.worst(answer.x, answer.g)),
-        warnings=_warnings(mission, legs) if success else (),
-        tolerance=tol,
-        error=error,
-        reason=f"{len(legs)} legs of {', '.join(str(leg.steps) for leg in legs)} steps",
-        provenance=replace(about, options=climb.options),
-    )
-
-
-def _leg_solution(
-    mission: Mission, index: int, path: MissionPath, cost: float, status: str, level: Level
-) -> Solution:
-    leg = path.legs[index]
-    problem = mission.fixed_at(index, path.begins[index], float(leg.mass[0]), leg.duration)
-    dynamics = Dynamics.of(problem)
-    momentum, velocity = end_momenta(dynamics, leg, problem.start_time)
-    return Solution(
-        problem=problem,
-        path=leg,
-        **reported(leg, velocity, momentum, force_of(dynamics, leg)),
-        objective=mission.objective.sense * cost,
-        success=status == "solved",
-        status=status,
-        message="a leg of a mission",
-        ladder=(level,),
-        provenance=Provenance.of(problem),
-    )
-
-
-def _impulses(mission: Mission, path: MissionPath, legs: Sequence[Solution]) -> tuple[Kick, ...]:
-    found = []
-    for joint in mission.joints:
-        kicks = kicks_of(joint, path.own.get(joint.name), mission.dimension)
-        if joint.left is None:
-            time_, place = path.begins[0], path.legs[0].place[0]
-        else:
-            time_ = path.begins[joint.left] + path.legs[joint.left].duration
-            place = path.legs[joint.left].place[-1]
-        found += [Kick(joint.name, float(time_), place, change) for change in kicks]
-    return tuple(found)
-
-
-def _warnings(mission: Mission, legs: Sequence[Solution]) -> tuple[str, ...]:
-    found = []
-    for name, leg, stretch in zip(mission.leg_names, legs, mission.stretches, strict=True):
-        bound = stretch.limit_of_duration(leg.duration)
-        if bound is not None:
-            other = "shorter" if bound == "shortest" else "longer"
-            found.append(
-                f"{name} ends on its {bound} duration of {lasting(leg.duration, 6)}: a {other} one may cost less"
-            )
-    return tuple(found)

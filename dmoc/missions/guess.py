@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
-from dmoc.legs.ends import Periodic
-from dmoc.missions.mission import Mission
-from dmoc.missions.program import MissionPath
+from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import node_fractions, uniform_mesh
+from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
+from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
 # A guess of the whole mission is made at this many places, then cut into legs.
@@ -23,25 +23,28 @@ SAMPLES = 400
 LEAST_MASS = 0.2
 
 
-def guessed(mission: Mission, meshes: Sequence[tuple[np.ndarray, int]], given: Any = None) -> MissionPath:
+def guessed(
+    mission: Mission, meshes: Sequence[tuple[np.ndarray, int]], hold: bool = False, given: Any = None
+) -> MissionPath:
     """A guess on the meshes of all legs, one pair of mesh and order a leg.
 
     From `given`, a path over the whole mission as a function of the time or as arrays, else from the physics:
     straight lines and coasts between the places that are known.
     """
-    given = mission.guess if given is None else given
     durations = likely_durations(mission)
     if (path := getattr(given, "mission_path", given)) is not None and isinstance(path, MissionPath):
         return path.onto(meshes)
-    begin = mission.start_bounds[0] if not isinstance(mission.start_time, tuple) else float(
-        np.mean(mission.start_time)
+    begin = (
+        mission.start_bounds[0]
+        if not isinstance(mission.start_time, tuple)
+        else float(np.mean(mission.start_time))
     )
     begins = begin + np.append(0.0, np.cumsum(durations))
     places = _places(mission, durations, begins, given)
     legs, mass, own = [], float(mission.mass), {}
     for i, (problem, (mesh, order)) in enumerate(zip(mission.stretches, meshes, strict=True)):
         mass = _after(mission, i, mass)
-        legs.append(_leg(problem, mesh, order, places, begins[i], durations[i], mass))
+        legs.append(_leg(problem, (mesh, order, hold), places, begins[i], durations[i], mass))
         mass = float(legs[-1].mass[-1])
     for joint in mission.joints:
         if (values := _own(mission, joint, legs)) is not None:
@@ -78,7 +81,7 @@ def _places(
         return lambda times: np.stack([np.interp(times, known, column) for column in values.T], axis=1)
     knots = _known(mission, begins)
     found = []
-    for (first, start), (last, goal) in zip(knots[:-1], knots[1:], strict=True):
+    for (first, start), (last, goal) in pairwise(knots):
         span = float(begins[last] - begins[first])
         problem = mission.span(first, start, goal, float(begins[first]), span)
         mesh = uniform_mesh(SAMPLES)
@@ -95,7 +98,7 @@ def _known(mission: Mission, begins: np.ndarray) -> list[tuple[int, Any]]:
     last = len(mission.joints) - 1
     for i, joint in enumerate(mission.joints):
         if joint.boundary is not None:
-            end = mission.start if i == last and isinstance(mission.goal, Periodic) else joint.boundary
+            end = mission.start if i == last and mission.closes else joint.boundary
             known.append((i, end))
             continue
         for event in joint.events:
@@ -116,25 +119,30 @@ def _after(mission: Mission, index: int, mass: float) -> float:
 
 def _leg(
     problem: TransferProblem,
-    mesh: np.ndarray,
-    order: int,
+    numerics: tuple[np.ndarray, int, bool],
     places: Callable[[np.ndarray], np.ndarray],
     begin: float,
     duration: float,
     mass: float,
 ) -> DiscretePath:
+    mesh, order, hold = numerics
     fractions = node_fractions(mesh, scheme(order))
     position = places(begin + duration * fractions)
     slopes = np.gradient(position, duration * fractions, axis=0)
     masses, control = np.full(len(fractions), mass), np.zeros((len(fractions), problem.controls))
     limit = problem.actuator.force_limit()
     if problem.actuator.burns and limit is not None:
-        full = controls_for(problem, limit * slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-12)[:, None])
+        full = controls_for(
+            problem, limit * slopes / np.maximum(np.linalg.norm(slopes, axis=1), 1e-12)[:, None]
+        )
         if full is not None:
             flow = np.asarray(problem.actuator.flow(full[0]), float).item()
             share = min(1.0, (1 - LEAST_MASS) * mass / (flow * duration))
             masses, control = mass - share * flow * duration * fractions, share * full
-    return DiscretePath(mesh, order, False, duration, position, control, masses, slopes[0], slopes[-1])
+    if hold:
+        rule = scheme(order)
+        control = np.einsum("j,jkn->kn", rule.weights, control[step_nodes(len(mesh) - 1, rule)])
+    return DiscretePath(mesh, order, hold, duration, position, control, masses, slopes[0], slopes[-1])
 
 
 def _own(mission: Mission, joint: Any, legs: list[DiscretePath]) -> np.ndarray | None:
@@ -142,18 +150,18 @@ def _own(mission: Mission, joint: Any, legs: list[DiscretePath]) -> np.ndarray |
     axes = mission.dimension
     if not joint.events:
         return None
-    before = None if joint.left is None else legs[joint.left].goal_velocity
-    after = None if joint.right is None else legs[joint.right].start_velocity
-    known = [] if joint.left is not None else [None]
+    at_start = joint.left is None
+    before = legs[joint.right if at_start else joint.left].start_velocity  # type: ignore[index]
+    after = before
+    if not at_start:
+        before = legs[joint.left].goal_velocity
+        after = before if joint.right is None else legs[joint.right].start_velocity
     if joint.boundary is not None:
-        place = legs[joint.right].position[0] if joint.left is None else legs[joint.left].position[-1]
-        near = (place, after if joint.left is None else before)
-        speed = joint.boundary.estimate(mission.start_bounds[0], near)[1]
-        speed = np.where(np.isnan(speed), near[1], speed)
-        before, after = (speed, after) if joint.left is None else (before, speed)
-    parts = [before] if known else []
-    for event in joint.events:
-        parts.append(event.first_guess(before[:axes], after[:axes]))
+        beside = legs[0].position[0] if at_start else legs[-1].position[-1]
+        near = after if at_start else before
+        speed = joint.boundary.estimate(mission.start_bounds[0], (beside, near))[1]
+        speed = np.where(np.isnan(speed), near, speed)
+        before, after = (speed, after) if at_start else (before, speed)
+    parts = [before] if at_start else []
+    parts += [event.first_guess(before[:axes], after[:axes]) for event in joint.events]
     return np.concatenate(parts)
-
-

@@ -17,11 +17,12 @@ import numpy as np
 
 from dmoc.configurations.base import Configuration
 from dmoc.legs.events import Instant, condition_rows
-from dmoc.missions.mission import Joint, Mission
+from dmoc.legs.legs import Joint
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake
+from dmoc.scene.mission import Mission
 
 # The size of an impulse is rounded at zero over this part of the unit of speed [-].
 ROUNDED = 1e-8
@@ -90,6 +91,7 @@ class JointWriter:
         if joint.left is not None:
             return self.state(joint.left, last=True)
         behind = self._behind
+        assert behind is not None
         if not joint.events:
             return behind
         speeds = self.take_own("velocity")
@@ -159,7 +161,7 @@ def _merged(places: list[np.ndarray], symbols: list[ca.SX]) -> tuple[np.ndarray,
 
 
 def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
-    """The unknowns of a joint itself: those of its events, and at a start with events the velocity before them."""
+    """The unknowns of a joint itself: of its events, and at a start with events the velocity before them."""
     units, body = program.units, program.dynamics.configuration
     layout = Layout()
     if joint.left is None and joint.events:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.legs.ends import Periodic
 from dmoc.missions.joining import JointWriter, Placed, own_unknowns
-from dmoc.missions.mission import Joint, Mission
+from dmoc.missions.path import MissionPath, kick_cost
+from dmoc.missions.whole import row_to_drop, whole_rows
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
@@ -24,61 +24,11 @@ from dmoc.nlp.program import Program
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.parts.rows import Row
+from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
 # The rows that belong to no joint are in the group of this name.
 WHOLE = "mission"
-
-
-@dataclass(frozen=True)
-class MissionPath:
-    """The paths of all legs, and what belongs to the joints.
-
-    Attributes
-    ----------
-    legs : tuple of DiscretePath
-    begins : tuple of float
-        Time at the start of each leg [s].
-    own : dict of array
-        Unknowns of the joints themselves, by the name of the joint [SI].
-    forces : dict of array
-        Multipliers of the rows of the joints [objective per unit of the row], by the name of the joint.
-    """
-
-    legs: tuple[DiscretePath, ...]
-    begins: tuple[float, ...]
-    own: dict[str, np.ndarray] = field(default_factory=dict)
-    forces: dict[str, np.ndarray] = field(default_factory=dict)
-
-    @property
-    def warm(self) -> bool:
-        """Whether there are multipliers to start from."""
-        return all(leg.multipliers for leg in self.legs)
-
-    @property
-    def place(self) -> np.ndarray:
-        """Places at the nodes of all legs [m]."""
-        return np.concatenate([leg.place for leg in self.legs])
-
-    @property
-    def diagonal(self) -> float:
-        """Diagonal of the box around the path [m]."""
-        return float(np.linalg.norm(np.ptp(self.place, axis=0)))
-
-    @property
-    def attitudes(self) -> list[np.ndarray]:
-        """The attitudes of each body that turns in the first leg."""
-        return self.legs[0].attitudes
-
-    @property
-    def turn(self) -> float:
-        """The largest angle that a body is turned by in a leg [rad]."""
-        return max(leg.turn for leg in self.legs)
-
-    def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> MissionPath:
-        """The same on other meshes and orders, one pair a leg."""
-        legs = [leg.onto(mesh, order, leg.hold) for leg, (mesh, order) in zip(self.legs, meshes, strict=True)]
-        return replace(self, legs=tuple(legs))
 
 
 @dataclass(frozen=True)
@@ -103,7 +53,7 @@ class MissionProgram:
     def of(cls, mission: Mission, problems: Sequence[TransferProblem], path: MissionPath) -> MissionProgram:
         """The program of a mission whose legs are these problems, on the meshes of a path."""
         sizes = [units_of(problem, leg) for problem, leg in zip(problems, path.legs, strict=True)]
-        cost = max(_cost_of(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
+        cost = max(kick_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
         legs, blocks, at = [], [], np.zeros(3, int)
         for problem, leg, unit in zip(problems, path.legs, sizes, strict=True):
             program, mine, parameters = _leg_program(problem, leg, replace(unit, cost=cost))
@@ -111,7 +61,8 @@ class MissionProgram:
             blocks += [block.moved(*map(int, at)) for block in mine]
             at += (program.columns.size, program.rows.size, parameters)
         columns, first_row, leg_blocks = int(at[0]), int(at[1]), len(blocks)
-        own, rows, writers, bounds = {}, Layout(), [], []
+        own, rows, writers = {}, Layout(), []
+        bounds: list[tuple[np.ndarray, np.ndarray]] = []
         for joint in mission.joints:
             beside = legs[joint.right if joint.left is None else joint.left].program  # type: ignore[index]
             layout = own_unknowns(joint, beside, mission.mass)
@@ -121,16 +72,24 @@ class MissionProgram:
             columns += layout.size
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
-        drop = _row_to_drop(mission, path)
-        whole, places, expressions = _whole_rows(mission, legs, drop)
+        drop = row_to_drop(mission, path)
+        whole, places, expressions = whole_rows(mission, legs, drop)
         rows = _add(rows, WHOLE, whole, _largest([leg.program.units for leg in legs]), bounds)
-        blocks += [writer.written(rows, first_row) for writer in writers if writer.rows or not ca.SX(writer.cost).is_zero()]
+        blocks += [
+            writer.written(rows, first_row)
+            for writer in writers
+            if writer.rows or not ca.SX(writer.cost).is_zero()
+        ]
         if whole:
             none = ca.SX(0, 1)
-            made = kernel("mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
+            made = kernel(
+                "mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0)
+            )
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
-        return cls(mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, leg_blocks, drop)
+        return cls(
+            mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, leg_blocks, drop
+        )
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -148,10 +107,10 @@ class MissionProgram:
         """Scale of every row."""
         return np.concatenate([*[leg.program.rows.scales() for leg in self.legs], self.rows.scales()])
 
-    def assembly(self) -> Assembly:
-        """The functions of the NLP with their sparse derivatives."""
+    def assembly(self, compiled: bool = False) -> Assembly:
+        """The functions of the NLP with their sparse derivatives; with `compiled` as machine code."""
         scales = self.column_scales(), self.row_scales(), 1 / self.cost
-        return assemble(self.blocks, *scales, self.sizes[2])
+        return assemble(self.blocks, *scales, self.sizes[2], compiled)
 
     def _parameters_of(self, index: int) -> np.ndarray:
         program = self.legs[index].program
@@ -244,12 +203,17 @@ class MissionProgram:
         return MissionPath(tuple(legs), tuple(begins), own, forces)
 
     def solve(
-        self, path: MissionPath, options: dict[str, Any], watch: Watch | None = None, carried: bool = False
+        self,
+        path: MissionPath,
+        options: dict[str, Any],
+        watch: Watch | None = None,
+        carried: bool = False,
+        compiled: bool = False,
     ) -> Answer:
         """One run of Ipopt from a path on these meshes."""
         lbx, ubx, lbg, ubg = self.bounds()
         lam_x, lam_g = self.multipliers(path)
-        solver = make_solver(self.assembly(), self.settings(path.warm, carried), options, watch)
+        solver = make_solver(self.assembly(compiled), self.settings(path.warm, carried), options, watch)
         given = {"x0": np.clip(self.pack(path), lbx, ubx), "lam_x0": lam_x, "lam_g0": lam_g}
         bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg, "p": self.parameters()}
         return run(solver, self._rounding, **given, **bounds)
@@ -282,7 +246,7 @@ class MissionProgram:
         return self.rows.name_of(place - self.first_row)
 
     def worst(self, x: np.ndarray, g: np.ndarray, count: int = 10) -> list[tuple[str, float, str]]:
-        """The most violated rows and bounds, worst first: name, size and unit; a row without a unit is scaled."""
+        """The most violated rows and bounds, worst first: name, scaled size, unit."""
         lbx, ubx, lbg, ubg = self.bounds()
         found = []
         for values, low, high, column in ((x, lbx, ubx, True), (g, lbg, ubg, False)):
@@ -290,19 +254,6 @@ class MissionProgram:
             found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
         found.sort(reverse=True)
         return [(self.name_of(place, column), size, "scaled") for size, place, column in found[:count]]
-
-    def costs(self, x: np.ndarray) -> list[float]:
-        """What each leg costs, without what belongs to joints, as it is minimised [unit of the objective]."""
-        values, parameters = x * self.column_scales(), self.parameters()
-        ends = [leg.columns for leg in self.legs[1:]] + [self.sizes[0]]
-        found = np.zeros(len(self.legs))
-        for block in self.blocks[: self.leg_blocks]:
-            known, constant = block.kernel.used
-            at = [block.first + place for place in constant]
-            given = values[block.columns], block.values[known], parameters[at]
-            mine = int(np.searchsorted(ends, block.columns.min(), side="right"))
-            found[mine] += float(ca.sum2(block.kernel.functions["cost"](*given)))
-        return found.tolist()
 
 
 def _leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
@@ -325,23 +276,6 @@ def _leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> 
     return program, placed.blocks, stencils.parameter_count
 
 
-def _cost_of(mission: Mission, path: MissionPath) -> float:
-    """About the cost of the impulses of a path."""
-    total = 0.0
-    for joint in mission.joints:
-        for values in kicks_of(joint, path.own.get(joint.name), mission.dimension):
-            total += abs(float(mission.objective.kick(float(np.linalg.norm(values)), mission.mass)))
-    return total
-
-
-def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
-    """The unknowns of each event of a joint that has some."""
-    sizes = [len(event.unknowns(axes)) for event in joint.events]
-    if own is None or not sum(sizes):
-        return []
-    return [part for part in np.split(own[-sum(sizes) :], np.cumsum(sizes)[:-1]) if len(part)]
-
-
 def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:
     """The layout of joints with one more group, whose scaled bounds are put behind the others."""
     if not new:
@@ -362,49 +296,3 @@ def _unit(units: Units, unit: str) -> float:
 
 def _largest(units: Sequence[Units]) -> Units:
     return max(units, key=lambda unit: unit.time)
-
-
-def _row_to_drop(mission: Mission, path: MissionPath) -> int:
-    """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
-    return int(np.argmax(np.abs(path.legs[0].start_velocity)))
-
-
-def _whole_rows(mission: Mission, legs: Sequence[Placed], drop: int) -> tuple[list[Row], np.ndarray, ca.SX]:
-    """Rows of the mission as a whole: its duration, and that its path closes."""
-    pool: list[tuple[np.ndarray, ca.SX]] = []
-
-    def take(places: np.ndarray) -> ca.SX:
-        pool.append((places, ca.SX.sym("x", len(places))))
-        return pool[-1][1]
-
-    first, last = legs[0], legs[-1]
-    rows: list[Row] = []
-    if mission.duration is not None:
-        shortest, longest = (
-            mission.duration if isinstance(mission.duration, tuple) else (mission.duration, mission.duration)
-        )
-        total = take(last.at(LEG_START, 0)) if len(legs) > 1 else ca.SX(0)
-        total = total - take(first.at(LEG_START, 0)) if len(legs) > 1 else total
-        free = "duration" in last.program.columns
-        total = total + (take(last.at("duration", 0)) if free else last.program.problem.duration_bounds[0])
-        rows.append(Row("duration", total, shortest, longest, "s"))
-    if isinstance(mission.goal, Periodic):
-        begin = take(first.at("position", 0)) + first.program.units.origin
-        end = take(last.at("position", -1)) + last.program.units.origin
-        gap = take(last.at("goal.velocity", 0)) - take(first.at("start.velocity", 0))
-        body = first.program.dynamics.configuration
-        away = body.along(begin, end - begin)
-        rows += [
-            Row(f"closed.position.{name}", away[i], 0.0, 0.0, "m") for i, name in enumerate(body.velocity_names)
-        ]
-        rows += [
-            Row(f"closed.velocity.{name}", gap[i], 0.0, 0.0, "m/s")
-            for i, name in enumerate(body.velocity_names)
-            if i != drop
-        ]
-    if not rows:
-        return [], np.zeros(0, int), ca.SX(0, 1)
-    places = np.concatenate([where for where, _ in pool])
-    return rows, places, ca.vertcat(*[symbols for _, symbols in pool])
-
-

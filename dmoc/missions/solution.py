@@ -12,12 +12,12 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import AGAIN
-from dmoc.missions.mission import Mission
-from dmoc.missions.program import MissionPath
+from dmoc.missions.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import Format, Table, as_array, one_line, read_table, write_table
 from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution, SolveError
 from dmoc.results.table import solution_of, solution_parts
+from dmoc.scene.mission import Mission
 
 # The name and version by which a file of a mission is known.
 MISSION_FILE = Format(
@@ -184,12 +184,6 @@ class MissionSolution:
             for i, leg in enumerate(self.legs)
         ]
         return replace(self, problem=problem, legs=tuple(legs))
-
-    def verify_legs(self) -> Any:
-        """What `dmoc.verify` does with the solution of a mission."""
-        from dmoc.missions.checks import verify_mission
-
-        return verify_mission(self)
 
     def save(self, path: str | os.PathLike, **provenance: Any) -> None:
         """Write the solution to a netCDF-4 file, whole or not at all; `provenance` as of a `Solution`."""

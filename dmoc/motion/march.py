@@ -230,10 +230,8 @@ def _inputs(path: DiscretePath, start_time: float) -> list[np.ndarray]:
     """Masses, controls, begin and length of all steps, side by side."""
     rule, steps = scheme(path.order), len(path.mesh) - 1
     at = step_nodes(steps, rule)
-    control = path.control if path.hold else path.control[at.T].reshape(at.size, path.control.shape[1])
-    if not control.shape[1]:
-        # Columns of no control would not be told apart.
-        control = np.zeros((0, 0))
+    count = path.control.shape[1]
+    control = path.control if path.hold else path.control[at.T].reshape(at.size * bool(count), count)
     times = start_time + path.duration * path.mesh[:-1]
     lengths = path.duration * np.diff(path.mesh)
     if np.array_equal(path.mesh, uniform_mesh(steps)):

@@ -247,6 +247,5 @@ def _points_within(key: Key, rule: Scheme) -> tuple[np.ndarray, np.ndarray]:
 
 def _between(old: np.ndarray, values: np.ndarray, new: np.ndarray) -> np.ndarray:
     """Linear interpolation of every column: never beyond the values it is made from."""
-    if not values.size:
-        return np.empty((len(new), *values.shape[1:]))
-    return np.stack([np.interp(new, old, column) for column in values.T], axis=1)
+    columns = [np.interp(new, old, column) for column in values.T]
+    return np.stack(columns, axis=1) if columns else np.empty((len(new), 0))

@@ -98,10 +98,7 @@ def reference(
 
 
 def _control_powers(dynamics: Dynamics, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
-    """Controls of every piece as a polynomial in its fraction, shape (size (s+1), pieces), and their mesh.
-
-    Without a control there is a row of zeros in their place.
-    """
+    """Controls of every piece as a polynomial in its fraction, shape (size (s+1), pieces), and their mesh."""
     if not path.control.shape[1]:
         return np.zeros((1, len(path.mesh) - 1)), path.mesh
     if path.hold:

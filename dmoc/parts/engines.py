@@ -81,7 +81,7 @@ class Engine(Burner):
     dry_mass : float
         Mass below which it cannot burn [kg].
     min_thrust : float
-        Throttle floor [N].
+        Throttle floor [N]; equal to max_thrust where the engine burns fully throughout.
     box : float or sequence of float, optional
         Further limit on each component of the thrust [N].
     smoothing : float
@@ -102,9 +102,9 @@ class Engine(Burner):
             max_thrust=number("max_thrust", self.max_thrust, "N", positive=True),
             min_thrust=number("min_thrust", self.min_thrust, "N", nonnegative=True),
         )
-        if self.min_thrust >= self.max_thrust:
+        if self.min_thrust > self.max_thrust:
             raise ValueError(
-                "Engine: min_thrust must be less than max_thrust; "
+                "Engine: min_thrust must not be more than max_thrust; "
                 f"got {self.min_thrust:g} and {self.max_thrust:g} N"
             )
         checked(self, smoothing=number("smoothing", self.smoothing, "-", positive=True))
@@ -169,6 +169,8 @@ class Engine(Burner):
         return np.maximum(0.0, np.maximum(over, thrust - throttle))
 
     def words(self) -> str:
+        if self.min_thrust == self.max_thrust:
+            return f"an engine that burns at {self.max_thrust:g} N throughout{self._burning_words()}"
         floor = f" and at least {self.min_thrust:g} N" if self.min_thrust else ""
         return f"an engine of at most {self.max_thrust:g} N{floor}{self._burning_words()}"
 

@@ -8,11 +8,11 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from dmoc.basics.digits import lasting
-from dmoc.reports.words import effect_words, pairs, plain_table
+from dmoc.reports.layout import effect_words, pairs, plain_table
 
 if TYPE_CHECKING:
-    from dmoc.missions.mission import Mission
     from dmoc.missions.solution import MissionSolution
+    from dmoc.scene.mission import Mission
 
 
 def mission_scene(mission: Mission) -> RenderableType:
@@ -65,12 +65,14 @@ def legs_table(solution: MissionSolution) -> RenderableType:
             lasting(leg.duration, 6),
             str(leg.order),
             str(leg.steps),
-            f"{leg.objective:.6g}",
+            f"{leg.objective or 0.0:.6g}",
             f"{leg.final_mass:.6g}",
         )
     parts: list[RenderableType] = [Text("Legs", "bold"), table]
     if solution.impulses:
-        kicks = plain_table(["impulse at", "time", "velocity change [m/s]", "along each axis [m/s]"], slice(1, 3))
+        kicks = plain_table(
+            ["impulse at", "time", "velocity change [m/s]", "along each axis [m/s]"], slice(1, 3)
+        )
         for kick in solution.impulses:
             along = ", ".join(f"{value:.5g}" for value in kick.change)
             when = lasting(kick.time, 6) if kick.time else "0 s"

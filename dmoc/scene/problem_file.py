@@ -1,7 +1,7 @@
-"""Problem files: found by name, read, and made into transfer problems.
+"""Problem files: found by name, read, and made into transfer problems and missions.
 
-A problem file is Python with one function `problem(**parameters)`, all of whose parameters have
-defaults, that returns a `TransferProblem`. Its docstring documents them as `name : type [unit]`.
+A problem file is Python with one function `problem(**parameters)`, all of whose parameters have defaults,
+that returns one. Its docstring documents them as `name : type [unit]`.
 """
 
 from __future__ import annotations
@@ -79,11 +79,9 @@ class ProblemFile:
         for name, value in values.items():
             _check_type(name, value, self.parameter(name).default)
         made = _guarded(self.path, lambda: self.function(**values))
-        if not (isinstance(made, TransferProblem) or hasattr(made, "solve_legs")):
-            raise ValueError(
-                f"{self.path}: {FUNCTION}() must return a dmoc.TransferProblem or a dmoc.Mission; "
-                f"it returned {_short(made)}"
-            )
+        if not (isinstance(made, TransferProblem) or hasattr(made, "joints")):
+            wanted = f"{FUNCTION}() must return a dmoc.TransferProblem or a dmoc.Mission"
+            raise ValueError(f"{self.path}: {wanted}; it returned {_short(made)}")
         chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
         return replace(made, name=self.name, parameters=chosen)
 

@@ -78,19 +78,6 @@ def solve(
     ValueError
         If an argument has no meaning for this problem.
     """
-    if (by_legs := getattr(problem, "solve_legs", None)) is not None:
-        if mesh is not None:
-            raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
-        return by_legs(
-            order=order,
-            steps=steps,
-            tol=None if tol is None else _tolerance(tol),
-            hold=hold,
-            guess=guess,
-            options=options,
-            progress=progress,
-            time_limit=time_limit,
-        )
     of_kind("problem", problem, TransferProblem)
     scheme(2 if order is None else order)
     hold = flag("hold", hold)

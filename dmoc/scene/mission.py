@@ -7,44 +7,21 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
-from dmoc.legs.ends import Free, Loose, Periodic
-from dmoc.legs.events import Event, Impulse, Leg
-from dmoc.legs.objectives import Share
+from dmoc.legs.ends import Loose
+from dmoc.legs.events import Event, Impulse
+from dmoc.legs.legs import Joint, Leg, both_ends, span_of
+from dmoc.legs.objectives import DeltaV, Share
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
-from dmoc.parts.objectives import Effort, Objective
+from dmoc.parts.objectives import Effort, FinalMass, Fuel, Objective
 from dmoc.scene.problem import TransferProblem
 
 # The shortest duration of a leg that gives none is this part of the mission's longest [-].
 LEAST_SHARE = 1e-4
-
-
-@dataclass(frozen=True)
-class Joint:
-    """Where legs meet, or where the first begins or the last ends.
-
-    Attributes
-    ----------
-    name : str
-        "start", "goal" or "joint 1" and so on.
-    events : tuple of Event
-        What happens there, in turn.
-    left, right : int or None
-        The legs before and behind it.
-    boundary : Boundary or None
-        The start or the goal of the mission.
-    """
-
-    name: str
-    events: tuple[Event, ...]
-    left: int | None
-    right: int | None
-    boundary: Boundary | None = None
 
 
 @dataclass(frozen=True)
@@ -105,7 +82,7 @@ class Mission:
         if not any(isinstance(part, Leg) for part in self.legs):
             raise ValueError("legs has no leg; give at least one Leg or Coast")
         if self.duration is not None:
-            checked(self, duration=_span("duration", self.duration))
+            checked(self, duration=span_of("duration", self.duration))
         span = entries(self.start_time)
         if span is None:
             checked(self, start_time=number("start_time", self.start_time, "s"))
@@ -134,9 +111,14 @@ class Mission:
         return any(leg.free_duration for leg in self.stretches)
 
     @property
+    def closes(self) -> bool:
+        """Whether the goal is the state of the start once more."""
+        return bool(getattr(self.goal, "closes", False))
+
+    @property
     def start_bounds(self) -> tuple[float, float]:
         """Earliest and latest time of the start [s]."""
-        return self.start_time if isinstance(self.start_time, tuple) else (self.start_time, self.start_time)
+        return both_ends(self.start_time)
 
     @property
     def plan(self) -> tuple[Leg, ...]:
@@ -147,7 +129,9 @@ class Mission:
     def leg_names(self) -> tuple[str, ...]:
         """A name for each leg."""
         kinds = (type(leg).__name__.lower() for leg in self.plan)
-        return tuple(leg.name or f"{kind} {i + 1}" for i, (leg, kind) in enumerate(zip(self.plan, kinds, strict=True)))
+        return tuple(
+            leg.name or f"{kind} {i + 1}" for i, (leg, kind) in enumerate(zip(self.plan, kinds, strict=True))
+        )
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
@@ -198,9 +182,9 @@ class Mission:
     @cached_property
     def _whole(self) -> TransferProblem:
         """The mission as one transfer by its first leg: it checks the parts and completes the ends."""
-        goal = Loose.like(self.start) if isinstance(self.goal, Periodic) else self.goal
-        longest = sum(_ends(self._span_of(leg))[1] for leg in self.plan)
-        shortest = sum(_ends(self._span_of(leg))[0] for leg in self.plan)
+        goal = Loose.like(self.start) if self.closes else self.goal
+        longest = sum(both_ends(self._span_of(leg))[1] for leg in self.plan)
+        shortest = sum(both_ends(self._span_of(leg))[0] for leg in self.plan)
         span = shortest if shortest == longest else (shortest, longest)
         share = Share(self.objective)
         return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])
@@ -215,8 +199,7 @@ class Mission:
         start = self.start.with_dimension(axes)
         checked(self, start=start, goal=self.goal.with_dimension(axes))
         whole = self._whole
-        periodic = isinstance(self.goal, Periodic)
-        checked(self, start=whole.start, goal=self.goal if periodic else whole.goal)
+        checked(self, start=whole.start, goal=self.goal if self.closes else whole.goal)
 
     def _span_of(self, leg: Leg) -> Any:
         if leg.duration is not None:
@@ -226,29 +209,26 @@ class Mission:
                 "a leg has no duration and neither has the mission; give one of them, a number or "
                 "(shortest, longest) [s]"
             )
-        longest = _ends(self.duration)[1]
+        longest = both_ends(self.duration)[1]
         return (LEAST_SHARE * longest, longest)
 
     def _check_spans(self) -> None:
         """Legs must fit into the duration of the mission."""
         spans = []
         for leg, name in zip(self.plan, self.leg_names, strict=True):
-            spans.append(_ends(_span(f"duration of {name}", self._span_of(leg))))
+            spans.append(both_ends(span_of(f"duration of {name}", self._span_of(leg))))
         if self.duration is None:
             return
-        shortest, longest = _ends(self.duration)
+        shortest, longest = both_ends(self.duration)
         least, most = (sum(side) for side in zip(*spans, strict=True))
         if least > longest or most < shortest:
             raise ValueError(
-                f"the legs last {least:g} to {most:g} s together, but the mission {shortest:g} to {longest:g} s; "
-                "change one of them"
+                f"the legs last {least:g} to {most:g} s together, but the mission {shortest:g} to "
+                f"{longest:g} s; change one of them"
             )
 
     def _check_impulses(self) -> None:
         """Impulses without a limit must cost something, and the objective must be able to say what."""
-        from dmoc.legs.objectives import DeltaV
-        from dmoc.parts.objectives import FinalMass, Fuel
-
         impulses = [part for part in self.legs if isinstance(part, Impulse)]
         sought = {type(term) for weight, term in self.objective.terms if weight}
         if impulses and Fuel in sought:
@@ -259,16 +239,11 @@ class Mission:
         for one in impulses:
             costly = DeltaV in sought or (FinalMass in sought and one.exhaust_velocity is not None)
             if one.limit is None and not costly:
+                names = ", ".join(sorted(term.__name__ for term in sought))
                 raise ValueError(
-                    f"an impulse without a limit costs nothing with {', '.join(sorted(t.__name__ for t in sought))}; "
+                    f"an impulse without a limit costs nothing with {names}; "
                     "use objective=DeltaV(), or Impulse(limit=...) [m/s]"
                 )
-
-    def solve_legs(self, **numerics: Any) -> Any:
-        """What `dmoc.solve` does with a mission; the arguments are its own."""
-        from dmoc.missions.climb import solve_mission
-
-        return solve_mission(self, **numerics)
 
     def span(
         self, index: int, start: Boundary, goal: Boundary, start_time: float, duration: float
@@ -281,21 +256,3 @@ class Mission:
     def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:
         """A leg as a transfer whose time, mass and duration are known."""
         return replace(self.stretches[index], start_time=start_time, mass=mass, duration=duration)
-
-
-def _span(name: str, value: Any) -> Any:
-    ends = entries(value)
-    if ends is None:
-        return number(name, value, "s", positive=True)
-    if len(ends) != 2:
-        raise ValueError(f"{name} must be one number or (shortest, longest) [s]; got {short(value)}")
-    shortest, longest = (number(name, end, "s", positive=True) for end in ends)
-    if shortest >= longest:
-        raise ValueError(f"{name}: its shortest must be less than its longest; got {shortest:g}, {longest:g} s")
-    return shortest, longest
-
-
-def _ends(span: Any) -> tuple[float, float]:
-    return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]
-
-

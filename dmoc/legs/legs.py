@@ -1,0 +1,100 @@
+"""Legs of a mission, and the joints where they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dmoc.basics.arguments import checked, entries, number, short, whole
+from dmoc.ends.base import Boundary
+from dmoc.legs.events import Event
+from dmoc.parts.forces import Unpowered
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A part of a mission, with its own forces, limits and duration. What is not given is the mission's.
+
+    Parameters
+    ----------
+    duration : float or (float, float), optional
+        [s]; a pair (shortest, longest) leaves it free between the two. Without one it is free within the
+        duration of the mission.
+    effects, constraints : sequence, optional
+        What acts on the body, and the limits on its way, in this leg.
+    actuator : Actuator, optional
+        What pushes it in this leg.
+    order, steps : int, optional
+        Order of the scheme and number of steps of this leg.
+    name : str
+        Its name in messages, tables and pictures.
+    """
+
+    duration: Any = None
+    effects: Sequence | None = None
+    actuator: Any = None
+    constraints: Sequence | None = None
+    order: int | None = None
+    steps: int | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
+        if self.steps is not None:
+            whole("Leg: steps", self.steps, least=2)
+        if self.order not in (None, 2, 4, 6, 8):
+            raise ValueError(f"Leg: order must be 2, 4, 6 or 8; got {short(self.order)}")
+
+
+@dataclass(frozen=True)
+class Coast(Leg):
+    """A leg without thrust: it has no controls at all."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.actuator is not None:
+            raise ValueError("Coast: there is no actuator in a coast; use Leg(duration, actuator=...)")
+        checked(self, actuator=Unpowered())
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Where legs meet, or where the first begins or the last ends.
+
+    Attributes
+    ----------
+    name : str
+        "start", "goal" or "joint 1" and so on.
+    events : tuple of Event
+        What happens there, in turn.
+    left, right : int or None
+        The legs before and behind it.
+    boundary : Boundary or None
+        The start or the goal of the mission.
+    """
+
+    name: str
+    events: tuple[Event, ...]
+    left: int | None
+    right: int | None
+    boundary: Boundary | None = None
+
+
+def span_of(name: str, value: Any) -> float | tuple[float, float]:
+    """A duration as one number or (shortest, longest) [s]; ValueError if it is neither."""
+    ends = entries(value)
+    if ends is None:
+        return number(name, value, "s", positive=True)
+    if len(ends) != 2:
+        raise ValueError(f"{name} must be one number or (shortest, longest) [s]; got {short(value)}")
+    shortest, longest = (number(name, end, "s", positive=True) for end in ends)
+    if shortest >= longest:
+        raise ValueError(f"{name}: its shortest must be less than its longest; got {shortest:g}, {longest:g} s")
+    return shortest, longest
+
+
+def both_ends(span: Any) -> tuple[float, float]:
+    """Shortest and longest of a duration, the same where it is one number."""
+    return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]

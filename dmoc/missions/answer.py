@@ -1,0 +1,129 @@
+"""The answer of an attempt at a mission as a MissionSolution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.digits import lasting
+from dmoc.missions.path import MissionPath, kicks_of
+from dmoc.missions.program import MissionProgram
+from dmoc.missions.solution import Kick, MissionSolution
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.march import force_of
+from dmoc.motion.momenta import end_momenta
+from dmoc.nlp.ipopt import STATUSES
+from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution, reported
+from dmoc.scene.mission import Mission
+
+
+def answered(
+    climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
+) -> MissionSolution:
+    """The answer of an attempt as a MissionSolution."""
+    mission, program, answer = climb.mission, attempt.program, attempt.answer
+    path, status = attempt.path, answer.status
+    costs = _costs(program, answer.x)
+    about = Provenance(
+        mission.name, mission.parameters, path.begins[0], mission.objective.unit_with(mission.actuator)
+    )
+    legs = tuple(
+        _leg_solution(mission, i, path, costs[i], status, climb.levels[-1]) for i in range(len(path.legs))
+    )
+    if status == "solved":
+        message, success = "a local optimum", True
+    else:
+        message, success = STATUSES[status].advice, False
+    if status == "stopped" and climb.interrupt.late:
+        status = OUT_OF_TIME
+        message = STATUSES[OUT_OF_TIME].advice
+    if success and not met:
+        status, success = NOT_MET, False
+        reached = "unknown" if error is None else f"{error.largest:.1e}"
+        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    impulses = _impulses(mission, path, legs)
+    mass = float(path.legs[-1].mass[-1])
+    sizes = [kick.size for kick in impulses if kick.joint == "goal"]
+    for event in mission.joints[-1].events:
+        mass = event.burnt(mass, sizes.pop(0) if event.unknowns(1) else 0.0)
+    return MissionSolution(
+        mission,
+        legs,
+        impulses,
+        path.own,
+        path.forces,
+        attempt.level.objective,
+        mass,
+        success,
+        status,
+        message,
+        tuple(climb.levels),
+        worst=() if success else tuple(program.worst(answer.x, answer.g)),
+        warnings=_warnings(mission, legs) if success else (),
+        tolerance=tol,
+        error=error,
+        reason=f"{len(legs)} legs of {', '.join(str(leg.steps) for leg in legs)} steps",
+        provenance=replace(about, options=climb.options),
+    )
+
+
+def _costs(program: MissionProgram, x: np.ndarray) -> np.ndarray:
+    """What each leg costs, without what belongs to joints, as it is minimised [unit of the objective]."""
+    values, parameters = x * program.column_scales(), program.parameters()
+    ends = [leg.columns for leg in program.legs[1:]] + [program.sizes[0]]
+    found = np.zeros(len(program.legs))
+    for block in program.blocks[: program.leg_blocks]:
+        known, used = block.kernel.used
+        given = values[block.columns], block.values[known], parameters[[block.first + place for place in used]]
+        mine = int(np.searchsorted(ends, block.columns.min(), side="right"))
+        found[mine] += float(ca.sum2(block.kernel.functions["cost"](*given)))
+    return found
+
+
+def _leg_solution(
+    mission: Mission, index: int, path: MissionPath, cost: float, status: str, level: Level
+) -> Solution:
+    leg = path.legs[index]
+    problem = mission.fixed_at(index, path.begins[index], float(leg.mass[0]), leg.duration)
+    dynamics = Dynamics.of(problem)
+    momentum, velocity = end_momenta(dynamics, leg, problem.start_time)
+    return Solution(
+        problem=problem,
+        path=leg,
+        **reported(leg, velocity, momentum, force_of(dynamics, leg)),
+        objective=mission.objective.sense * cost,
+        success=status == "solved",
+        status=status,
+        message="a leg of a mission",
+        ladder=(level,),
+        provenance=Provenance.of(problem),
+    )
+
+
+def _impulses(mission: Mission, path: MissionPath, legs: Sequence[Solution]) -> tuple[Kick, ...]:
+    found = []
+    for joint in mission.joints:
+        kicks = kicks_of(joint, path.own.get(joint.name), mission.dimension)
+        if joint.left is None:
+            time_, place = path.begins[0], path.legs[0].place[0]
+        else:
+            time_ = path.begins[joint.left] + path.legs[joint.left].duration
+            place = path.legs[joint.left].place[-1]
+        found += [Kick(joint.name, float(time_), place, change) for change in kicks]
+    return tuple(found)
+
+
+def _warnings(mission: Mission, legs: Sequence[Solution]) -> tuple[str, ...]:
+    found = []
+    for name, leg, stretch in zip(mission.leg_names, legs, mission.stretches, strict=True):
+        bound = stretch.limit_of_duration(leg.duration)
+        if bound is not None:
+            other = "shorter" if bound == "shortest" else "longer"
+            ends = f"{name} ends on its {bound} duration of {lasting(leg.duration, 6)}"
+            found.append(f"{ends}: a {other} one may cost less")
+    return tuple(found)

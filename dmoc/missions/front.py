@@ -1,0 +1,44 @@
+"""What a user calls: it takes a transfer or a mission, and does for each what is made for it."""
+
+from __future__ import annotations
+
+import os
+from functools import wraps
+from typing import Any
+
+from dmoc.basics.files import as_path
+from dmoc.checks import verification
+from dmoc.results import solution as transfers
+from dmoc.results.netcdf import format_of
+from dmoc.solver import solve as transfer_solver
+
+# A file of a mission says that it has this format.
+MISSION = "dmoc mission"
+
+
+@wraps(transfer_solver.solve)
+def solve(problem: Any, *given: Any, **numerics: Any) -> Any:
+    if not hasattr(problem, "joints"):
+        return transfer_solver.solve(problem, *given, **numerics)
+    # What solves missions is loaded for them alone.
+    from dmoc.missions.climb import solve_mission
+
+    return solve_mission(problem, *given, **numerics)
+
+
+@wraps(verification.verify)
+def verify(solution: Any, *given: Any, **more: Any) -> Any:
+    if not hasattr(solution, "impulses"):
+        return verification.verify(solution, *given, **more)
+    from dmoc.missions.checks import verify_mission
+
+    return verify_mission(solution, *given, **more)
+
+
+@wraps(transfers.load)
+def load(path: str | os.PathLike) -> Any:
+    if not as_path(path).is_file() or format_of(path) != MISSION:
+        return transfers.load(path)
+    from dmoc.missions.solution import read_mission
+
+    return read_mission(path)

@@ -1,0 +1,97 @@
+"""The path of a mission: those of its legs, and what belongs to its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dmoc.legs.legs import Joint
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.mission import Mission
+
+
+@dataclass(frozen=True)
+class MissionPath:
+    """The paths of all legs, and what belongs to the joints.
+
+    Attributes
+    ----------
+    legs : tuple of DiscretePath
+    begins : tuple of float
+        Time at the start of each leg [s].
+    own : dict of array
+        Unknowns of the joints themselves, by the name of the joint [SI].
+    forces : dict of array
+        Multipliers of the rows of the joints [objective per unit of the row], by the name of the joint.
+    """
+
+    legs: tuple[DiscretePath, ...]
+    begins: tuple[float, ...]
+    own: dict[str, np.ndarray] = field(default_factory=dict)
+    forces: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def warm(self) -> bool:
+        """Whether there are multipliers to start from."""
+        return all(leg.multipliers for leg in self.legs)
+
+    @property
+    def place(self) -> np.ndarray:
+        """Places at the nodes of all legs [m]."""
+        return np.concatenate([leg.place for leg in self.legs])
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box around the path [m]."""
+        return float(np.linalg.norm(np.ptp(self.place, axis=0)))
+
+    @property
+    def attitudes(self) -> list[np.ndarray]:
+        """The attitudes of each body that turns in the first leg."""
+        return self.legs[0].attitudes
+
+    @property
+    def turn(self) -> float:
+        """The largest angle that a body is turned by in a leg [rad]."""
+        return max(leg.turn for leg in self.legs)
+
+    def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> MissionPath:
+        """The same on other meshes and orders, one pair a leg."""
+        legs = [leg.onto(mesh, order, leg.hold) for leg, (mesh, order) in zip(self.legs, meshes, strict=True)]
+        return replace(self, legs=tuple(legs))
+
+
+def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
+    """The unknowns of each event of a joint that has some."""
+    sizes = [len(event.unknowns(axes)) for event in joint.events]
+    if own is None or not sum(sizes):
+        return []
+    return [part for part in np.split(own[-sum(sizes) :], np.cumsum(sizes)[:-1]) if len(part)]
+
+
+def finer(path: MissionPath, errors: Sequence[np.ndarray]) -> list[tuple[np.ndarray, int]]:
+    """Meshes on which the steps that make up the errors of all legs are cut in two."""
+    total = np.concatenate(errors)
+    order = np.argsort(total)
+    least = min(leg.order for leg in path.legs)
+    small = np.cumsum(total[order]) <= 0.5 * 2.0**-least * total.sum()
+    cut = np.ones(len(total), bool)
+    cut[order[small]] = False
+    found, at = [], 0
+    for leg in path.legs:
+        mine = cut[at : at + len(leg.mesh) - 1]
+        at += len(mine)
+        middles = 0.5 * (leg.mesh[1:] + leg.mesh[:-1])[mine]
+        found.append((np.sort(np.concatenate([leg.mesh, middles])), leg.order))
+    return found
+
+
+def kick_cost(mission: Mission, path: MissionPath) -> float:
+    """About the cost of the impulses of a path."""
+    total = 0.0
+    for joint in mission.joints:
+        for values in kicks_of(joint, path.own.get(joint.name), mission.dimension):
+            total += abs(float(mission.objective.kick(float(np.linalg.norm(values)), mission.mass)))
+    return total
