@@ -172,7 +172,7 @@ def source(title):
 def listed(root, line):
     """Put a line into the public list of a copy of the library."""
     file = root / "dmoc" / "__init__.py"
-    place = "    from dmoc.results.solution import load as load\n"
+    place = "    from dmoc.results.solution import Solution as Solution\n"
     assert place in file.read_text()
     file.write_text(file.read_text().replace(place, place + f"    {line}\n"))
 

@@ -11,8 +11,13 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
+
+# The remedies that are told where a user's function of a place, or of time and place, cannot be used.
+OF_PLACE = "it must take a position q [m] as a CasADi expression and give a number that is 0 on the surface"
+OF_TIME_AND_PLACE = "it must take (t, q) as CasADi expressions and give a position [m]"
 
 
 class Instant(NamedTuple):
@@ -208,11 +213,15 @@ class Frame(Event):
         if not callable(self.position):
             raise ValueError(f"Frame: position must be a function (t, q); got {short(self.position)}")
 
+    def check_dimension(self, dimension: int) -> None:
+        given = [ca.SX.sym("t"), ca.SX.sym("q", dimension)]
+        count = tried("Frame: position", self.position, given, OF_TIME_AND_PLACE)
+        if count != dimension:
+            raise ValueError(f"Frame: position must give {dimension} values; it gives {count}")
+
     def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         t, q, v = ca.SX.sym("t"), ca.SX.sym("q", here.q.numel()), ca.SX.sym("v", here.v.numel())
-        moved = ca.SX(ca.vertcat(*ca.vertsplit(ca.SX(self.position(t, q)))))
-        if moved.numel() != q.numel():
-            raise ValueError(f"Frame: position must give {q.numel()} values; it gives {moved.numel()}")
+        moved = ca.SX(as_column(self.position(t, q)))
         change = ca.Function("frame", [t, q, v], [moved, ca.jtimes(moved, q, v) + ca.jacobian(moved, t)])
         place, velocity = change(here.t, here.q, here.v)
         return Passed(here._replace(q=place, v=velocity), [])
@@ -244,9 +253,14 @@ class Bounce(Event):
             raise ValueError(f"Bounce: restitution must be 0 to 1 [-]; got {share:g}")
         checked(self, restitution=share)
 
+    def check_dimension(self, dimension: int) -> None:
+        count = tried("Bounce: surface", self.surface, [ca.SX.sym("q", dimension)], OF_PLACE)
+        if count != 1:
+            raise ValueError(f"Bounce: surface must give 1 value; it gives {count}")
+
     def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         q = ca.SX.sym("q", here.q.numel())
-        gap = ca.SX(self.surface(q))
+        gap = ca.SX(as_column(self.surface(q)))
         slope = ca.Function("slope", [q], [gap, ca.gradient(gap, q)])
         value, normal = slope(here.q)
         across = ca.dot(here.v, normal) / ca.dot(normal, normal)

@@ -44,7 +44,7 @@ class Leg:
             raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
         if self.steps is not None:
             whole("Leg: steps", self.steps, least=2)
-        if self.order not in (None, 2, 4, 6, 8):
+        if self.order is not None and whole("Leg: order", self.order, least=2) not in (2, 4, 6, 8):
             raise ValueError(f"Leg: order must be 2, 4, 6 or 8; got {short(self.order)}")
 
 

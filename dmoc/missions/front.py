@@ -18,6 +18,7 @@ MISSION = "dmoc mission"
 
 @wraps(transfer_solver.solve)
 def solve(problem: Any, *given: Any, **numerics: Any) -> Any:
+    problem = getattr(problem, "alone", None) or problem
     if not hasattr(problem, "joints"):
         return transfer_solver.solve(problem, *given, **numerics)
     # What solves missions is loaded for them alone.

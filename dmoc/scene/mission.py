@@ -72,6 +72,12 @@ class Mission:
     parameters: dict = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
+        for name in ("start", "goal"):
+            if not isinstance(getattr(self, name), Boundary):
+                raise ValueError(f"{name} must be a dmoc.Boundary; got {short(getattr(self, name))}")
+        if not isinstance(self.objective, Objective):
+            raise ValueError(f"objective must be a dmoc.Objective; got {short(self.objective)}")
+        checked(self, mass=number("mass", self.mass, "kg", positive=True))
         parts = entries(self.legs)
         if parts is None or not all(isinstance(part, (Leg, Event)) for part in parts):
             raise ValueError(
@@ -86,12 +92,13 @@ class Mission:
         span = entries(self.start_time)
         if span is None:
             checked(self, start_time=number("start_time", self.start_time, "s"))
-        elif len(span) != 2 or not span[0] < span[1]:
-            raise ValueError(
-                f"start_time must be one time or (earliest, latest) [s]; got {short(self.start_time)}"
-            )
         else:
-            checked(self, start_time=tuple(number("start_time", each, "s") for each in span))
+            times = tuple(number("start_time", each, "s") for each in span)
+            if len(times) != 2 or times[0] >= times[1]:
+                raise ValueError(
+                    f"start_time must be one time or (earliest, latest) [s]; got {short(self.start_time)}"
+                )
+            checked(self, start_time=times)
         self._check_spans()
         self._complete_ends()
         for part in self.legs:
@@ -179,6 +186,17 @@ class Mission:
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from error
 
+    @property
+    def alone(self) -> TransferProblem | None:
+        """The transfer that a mission of one leg is, without events and choices of its own; else None."""
+        leg = self.plan[0]
+        own = leg.order, leg.steps, leg.name or None
+        if len(self.legs) > 1 or self.closes or own != (None, None, None) or isinstance(self.start_time, tuple):
+            return None
+        span = self._span_of(leg) if self.duration is None else self.duration
+        whole = self._of_leg(leg, self.start, self.goal, self.objective, span, self.name)
+        return replace(whole, guess=self.guess, parameters=self.parameters)
+
     @cached_property
     def _whole(self) -> TransferProblem:
         """The mission as one transfer by its first leg: it checks the parts and completes the ends."""
@@ -248,9 +266,10 @@ class Mission:
     def span(
         self, index: int, start: Boundary, goal: Boundary, start_time: float, duration: float
     ) -> TransferProblem:
-        """A transfer between two ends by a leg's effects and the actuator of the mission, for a guess."""
-        leg = replace(self.plan[index], actuator=None) if type(self.plan[index]) is Leg else self.plan[index]
-        problem = self._of_leg(leg, start, goal, Share(self.objective), duration, self.leg_names[index])
+        """A transfer between two ends by what acts in a leg, for a guess."""
+        problem = self._of_leg(
+            self.plan[index], start, goal, Share(self.objective), duration, self.leg_names[index]
+        )
         return replace(problem, start_time=start_time)
 
     def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:

@@ -83,7 +83,8 @@ class ProblemFile:
             wanted = f"{FUNCTION}() must return a dmoc.TransferProblem or a dmoc.Mission"
             raise ValueError(f"{self.path}: {wanted}; it returned {_short(made)}")
         chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
-        return replace(made, name=self.name, parameters=chosen)
+        made = replace(made, name=self.name, parameters=chosen)
+        return getattr(made, "alone", None) or made
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of this name; ValueError if there is none."""

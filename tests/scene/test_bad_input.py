@@ -28,6 +28,7 @@ from dmoc import (
     Drag,
     Effect,
     Effort,
+    Free,
     FreeForce,
     Holonomic,
     Joint,
@@ -38,8 +39,10 @@ from dmoc import (
     JointState,
     JointTorque,
     KeepOut,
+    Leg,
     LinearDrag,
     Member,
+    Mission,
     MomentumLimit,
     Objective,
     On,
@@ -67,6 +70,9 @@ from dmoc import (
     verify,
 )
 from dmoc.cli.app import main
+from dmoc.legs.events import Event
+from dmoc.missions.guess import guessed
+from dmoc.missions.program import MissionProgram
 from dmoc.plots.page import save_figure
 from dmoc.studies.drift import kepler
 
@@ -86,8 +92,10 @@ MAKES = {
     "Attitude": {"quaternion": (1, 0, 0, 0), "rate": (0, 0, 0), "other_way": False},
     "BallForce": {"limit": 2.0},
     "BallTorque": {"limit": 2.0},
+    "Bounce": {"surface": lambda q: q[1], "restitution": 0.5},
     "BoxForce": {"limit": 2.0},
     "CircularOrbit": {"radius": 2.0, "mu": 1.0, "center": (0, 0), "normal": None, "clockwise": False},
+    "Coast": {"duration": (1.0, 2.0), "effects": None, "constraints": None, "order": 4, "steps": 3, "name": ""},
     "ClohessyWiltshire": {"mean_motion": 0.1},
     "Condition": {
         "function": lambda t, q, v, m: q[0] - 4,
@@ -98,6 +106,7 @@ MAKES = {
     "ConicalShadow": {"radius": 1.0, "sun_radius": 7e8},
     "CylindricalShadow": {"radius": 1.0, "sharpness": 10.0},
     "Drag": {"area": 1.0, "drag_coefficient": 1.0, "atmosphere": UniformAtmosphere(1.0)},
+    "Drop": {"mass": 0.1},
     "Engine": {
         "max_thrust": 2.0,
         "specific_impulse": 300.0,
@@ -116,9 +125,12 @@ MAKES = {
     },
     "FinalHeight": {"axis": 1},
     "FinalRadius": {"center": (0, 0)},
+    "Frame": {"position": lambda t, q: q, "name": "another"},
+    "Free": {"axes": 2},
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
     "Fixed": JOINT,
+    "Impulse": {"limit": 2.0, "exhaust_velocity": 9.0},
     "JointDamper": {"joint": HINGE, "damping": 1.0},
     "JointForce": {"joint": Prismatic((1, 0, 0)), "limit": 2.0},
     "JointLimit": {"joint": HINGE, "low": -1.0, "high": 1.0},
@@ -130,8 +142,26 @@ MAKES = {
     "Spherical": JOINT,
     "KeepIn": {"lower": (-9, -9), "upper": (9, 9), "point": None},
     "KeepOut": {"center": (2, 2), "radius": 0.5, "point": None},
+    "Leg": {
+        "duration": (1.0, 2.0),
+        "effects": None,
+        "actuator": FreeForce(),
+        "constraints": None,
+        "order": 4,
+        "steps": 3,
+        "name": "",
+    },
     "LinearDrag": {"coefficient": 0.1, "wind": None},
     "Member": {"name": "a", "mass": 1.0, "inertia": None},
+    "Mission": scene(
+        legs=(Leg(4.0),),
+        effects=(),
+        actuator=FreeForce(),
+        objective=Effort(),
+        constraints=(),
+        guess=None,
+        start_time=0.0,
+    ),
     "MomentumLimit": {"limit": (1.0, 1.0, 1.0)},
     "Moving": {"position": lambda t: (t, 0 * t), "velocity": "matched", "attitude": None, "rate": "matched"},
     "Nozzles": {
@@ -141,6 +171,7 @@ MAKES = {
         "dry_mass": 0.1,
     },
     "Orbit": dict.fromkeys(("i", "raan", "argp", "nu")) | {"mu": 1.0, "a": 2.0, "e": 0.1, "center": (0, 0)},
+    "Periodic": {"axes": 2},
     "PivotGravity": {"acceleration": (0, 0, -1), "arm": (0, 0, 1)},
     "PlateDrag": {"plates": PLATES, "density": 1.0, "coefficient": 1.1},
     "PlateRadiation": {"plates": PLATES, "direction": (1, 0, 0), "flux": 1361.0, "reflectivity": 0.3},
@@ -177,6 +208,7 @@ MAKES = {
     ),
     "UniformAtmosphere": {"density": 1.0, "wind": (0, 1)},
     "UniformGravity": {"acceleration": (0, -1)},
+    "Via": {"boundary": (1, 1)},
     "Wheels": {
         "axes": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
         "max_torque": 1.0,
@@ -324,9 +356,26 @@ def put_to_use(part):
     return TransferProblem(**scene(effects=[ThirdBody(1.0, part)]))
 
 
+def as_mission(part):
+    """A mission with this part in it, as it would be solved; None for a part of a transfer."""
+    if isinstance(part, (Leg, Event)):
+        legs = [part] if isinstance(part, Leg) else [Leg(1.0), part, Leg(1.0)]
+        part = Mission(1.0, HERE.start, HERE.goal, legs)
+    if isinstance(part, Free):
+        part = Mission(1.0, HERE.start, part, [Leg(1.0), Leg(1.0)])
+    if isinstance(part, Mission):
+        path = guessed(part, [(np.linspace(0, 1, 4), 4)] * len(part.plan))
+        MissionProgram.of(part, part.stretches, path)
+    return part if isinstance(part, Mission) else None
+
+
 def try_making(name, argument, value):
     part = answered(lambda: getattr(dmoc, name)(**(MAKES[name] | {argument: value})))
-    problem = None if part is None else answered(lambda: put_to_use(part))
+    if part is None or answered(lambda: as_mission(part)) is not None:
+        return
+    if isinstance(part, (Mission, Leg, Event, Free)):
+        return
+    problem = answered(lambda: put_to_use(part))
     if problem is not None:
         assert all(effect.words() for effect in problem.effects) and problem.goal.words()
         answered(lambda: transcribe(problem, 4))
@@ -349,12 +398,13 @@ def test_every_constructor_is_tried():
         "Joint",
         "Objective",
     }
-    without_arguments = {"Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow"}
+    without_arguments = {"DeltaV", "Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow", "Unpowered"}
     results = {
         "Body",
         "Check",
         "Evidence",
         "Formulation",
+        "MissionSolution",
         "NLP",
         "Report",
         "Row",

@@ -1,0 +1,287 @@
+"""Missions of several legs: closed forms, joints, files, and one leg as a transfer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dmoc
+from dmoc import (
+    BallForce,
+    Bounce,
+    CircularOrbit,
+    Coast,
+    Condition,
+    DeltaV,
+    Drop,
+    Engine,
+    FinalMass,
+    Frame,
+    Free,
+    Impulse,
+    KeepOut,
+    Leg,
+    Mission,
+    Periodic,
+    PointGravity,
+    State,
+    TransferProblem,
+    UniformGravity,
+    Via,
+    three_body,
+)
+from dmoc.missions.program import MissionProgram
+
+# Velocity changes of Hohmann's transfer from radius 1 to radius 2 with mu = 1, and its duration.
+HOHMANN = 0.2844570503761732
+HALF_PERIOD = np.pi * 1.5**1.5
+
+
+def hohmann(**more):
+    return Mission(
+        mass=1.0,
+        start=CircularOrbit(1.0, mu=1.0, center=(0, 0)),
+        goal=CircularOrbit(2.0, mu=1.0),
+        effects=[PointGravity(1.0)],
+        legs=[Impulse(), Coast((1, 60)), Impulse()],
+        objective=DeltaV(),
+        **more,
+    )
+
+
+def gates(free=True):
+    """From rest over (1, 1) to rest at (2, 0), with a free force."""
+    first, second = ((0.1, 1.9), (0.1, 1.9)) if free else (0.7, 1.3)
+    legs = [Leg(first), Via((1, 1)), Leg(second)]
+    return Mission(1.0, State((0, 0), (0, 0)), State((2, 0), (0, 0)), legs, duration=2.0)
+
+
+def rocket(**more):
+    """Straight up out of uniform gravity in two stages that burn at full thrust."""
+    return Mission(
+        mass=10.0,
+        start=State((0.0,), (0.0,)),
+        goal=State((None,), (None,)) if not more else more["goal"],
+        legs=[
+            Leg(2.0, actuator=Engine(200.0, exhaust_velocity=50.0, min_thrust=200.0), name="lower stage"),
+            Drop(1.0),
+            Leg(1.0, actuator=Engine(10.0, exhaust_velocity=60.0, min_thrust=10.0), name="upper stage"),
+        ],
+        effects=[UniformGravity((-1.0,))],
+        objective=DeltaV(),
+    )
+
+
+@pytest.mark.parametrize(("order", "steps"), [(2, (40, 80)), (4, (10, 20)), (6, (6, 12)), (8, (8, 16))])
+def test_hohmanns_transfer_has_the_order_of_the_scheme(order, steps):
+    coarse, fine = (dmoc.solve(hohmann(), order=order, steps=count) for count in steps)
+    errors = [abs(found.objective / HOHMANN - 1) for found in (coarse, fine)]
+    assert coarse.success and fine.success
+    assert np.log2(errors[0] / errors[1]) > order - 0.3
+    assert fine.duration == pytest.approx(HALF_PERIOD, rel=20 * errors[1])
+
+
+def test_hohmanns_transfer_to_a_tolerance_with_its_certificate():
+    found = dmoc.solve(hohmann(), tol=1e-9)
+    assert found.success and found.error.largest < 1e-9
+    assert found.objective == pytest.approx(HOHMANN, rel=1e-9)
+    assert found.velocity_change == pytest.approx(found.objective, rel=1e-12)
+    report = dmoc.verify(found)
+    assert report.ok
+    times, sizes = found.primer
+    assert sizes[[0, -1]] == pytest.approx(1.0, abs=1e-9) and sizes.max() < 1 + 1e-9
+    assert "no further impulse would help" in report["primer"].note
+    assert times[0] == 0.0
+
+
+@pytest.mark.parametrize("order", [4, 6, 8])
+def test_a_way_point_at_a_free_time_is_exact_with_one_polynomial_a_leg(order):
+    found = dmoc.solve(gates(), order=order, steps=2)
+    # Cubic splines through (1, 1): 15 N^2 s, halfway in time.
+    assert found.objective == pytest.approx(15.0, rel=1e-13)
+    assert [leg.duration for leg in found.legs] == pytest.approx([1.0, 1.0], abs=1e-9)
+    assert dmoc.verify(found).ok
+
+
+def test_a_way_point_at_a_fixed_time_and_its_multiplier():
+    assert dmoc.solve(gates(False), order=4, steps=2).objective == pytest.approx(21.958249454928612, rel=1e-13)
+    found = dmoc.solve(gates(), order=4, steps=2)
+    names = MissionProgram.of(found.problem, found.problem.stretches, found.path).rows["joint 1"].labels
+    # The derivative of the objective by the height of the way point is 24 N^2 s/m.
+    place = names.index("via_1.position.y")
+    assert abs(found.forces["joint 1"][place]) == pytest.approx(24.0, rel=1e-9)
+
+
+def test_order_2_across_a_free_time():
+    errors = [abs(dmoc.solve(gates(), order=2, steps=n).objective / 15 - 1) for n in (20, 40)]
+    assert np.log2(errors[0] / errors[1]) > 1.7
+
+
+def test_a_stage_is_dropped_with_its_velocity():
+    found = dmoc.solve(rocket())
+    assert found.success and dmoc.verify(found).ok
+    lower, upper = found.legs
+    assert lower.path.mass[-1] == pytest.approx(10 - 8, rel=1e-9)
+    assert upper.path.mass[0] == pytest.approx(lower.path.mass[-1] - 1, rel=1e-9)
+    assert upper.velocity[0] == pytest.approx(lower.velocity[-1])
+    # Tsiolkovsky's equation in each leg, less gravity.
+    speed = 50 * np.log(10 / 2) - 2.0 + 60 * np.log(1 / (1 - 10 / 60)) - 1.0
+    assert upper.velocity[-1] == pytest.approx([speed], rel=1e-4)
+
+
+def test_impulses_that_burn_follow_tsiolkovskys_equation():
+    burning = [Impulse(exhaust_velocity=1.0), Coast((1, 60)), Impulse(exhaust_velocity=1.0)]
+    found = dmoc.solve(replace(hohmann(), legs=burning, objective=FinalMass()), tol=1e-8)
+    assert found.final_mass == pytest.approx(np.exp(-HOHMANN), rel=1e-7)
+    assert found.objective == pytest.approx(found.final_mass, rel=1e-12)
+    assert dmoc.verify(found).ok
+
+
+def test_a_bounce_turns_the_velocity_across_round():
+    def thrown(restitution):
+        return Mission(
+            mass=1.0,
+            start=State((0.0, 1.0), (1.0, 0.0)),
+            goal=Free(),
+            legs=[Coast((0.1, 5.0)), Bounce(lambda q: q[1], restitution), Coast(0.5)],
+            effects=[UniformGravity((0.0, -2.0))],
+        )
+
+    for restitution in (1.0, 0.5):
+        found = dmoc.solve(thrown(restitution), order=4, steps=4)
+        before, after = found.legs
+        assert found.success and dmoc.verify(found)["joints"].ok
+        assert before.duration == pytest.approx(1.0, rel=1e-9)
+        assert before.velocity[-1] == pytest.approx([1.0, -2.0], rel=1e-8)
+        assert after.velocity[0] == pytest.approx([1.0, 2.0 * restitution], rel=1e-8)
+
+
+def test_a_leg_may_count_in_another_frame():
+    speed = 0.3
+    legs = [Coast(1.0), Frame(lambda t, q: [q[0] - speed * t, q[1]], "one that moves"), Coast(1.0)]
+    found = dmoc.solve(Mission(1.0, State((0, 0), (1, 2)), Free(), legs), order=4, steps=2)
+    assert found.legs[1].velocity[0] == pytest.approx([1 - speed, 2])
+    assert found.legs[1].position[-1] == pytest.approx([2 - 2 * speed, 4])
+
+
+def test_a_closed_path_around_a_lagrange_point():
+    ratio = 0.01215
+    start = State((0.8233, None), (0.0, None))
+    legs = [Coast((2.0, 4.0), steps=24)]
+
+    def around(time):
+        place = 0.8369 - 0.0136 * np.cos(2 * np.pi * time / 2.8)
+        return (place, 0.045 * np.sin(2 * np.pi * time / 2.8))
+
+    mission = Mission(1.0, start, Periodic(), legs, effects=three_body(ratio), guess=around)
+    found = dmoc.solve(mission)
+    assert found.success and dmoc.verify(found).ok
+    path = found.legs[0]
+    assert path.position[-1] == pytest.approx(path.position[0], abs=1e-9)
+    # The velocity that is not asked for again follows from Jacobi's integral, to the error of the scheme.
+    assert path.velocity[-1] == pytest.approx(path.velocity[0], abs=1e-6)
+
+
+def test_the_start_of_a_mission_may_be_free():
+    def beacon(t):
+        return [1.0 + 0.5 * t, 0.0 * t]
+
+    found = dmoc.solve(
+        Mission(
+            1.0,
+            State((0, 0), (0, 0)),
+            Condition(lambda t, q, v, m: [q[0] - beacon(t)[0], q[1] - beacon(t)[1], v[0], v[1]]),
+            [Leg(2.0)],
+            start_time=(-1.5, 3.0),
+        ),
+        order=4,
+        steps=2,
+    )
+    # The beacon is nearest at the earliest start.
+    assert found.legs[0].time[0] == pytest.approx(-1.5)
+    assert found.success and dmoc.verify(found).ok
+
+
+def test_one_leg_is_the_transfer_that_it_was():
+    transfer = TransferProblem(
+        2.0,
+        State((0, 0), (0, 0)),
+        State((3, 1), (0, 0)),
+        4.0,
+        actuator=BallForce(3.0),
+        constraints=[KeepOut((1.5, 0.4), 0.3)],
+    )
+    mission = Mission(
+        2.0,
+        transfer.start,
+        transfer.goal,
+        [Leg(4.0)],
+        actuator=transfer.actuator,
+        constraints=transfer.constraints,
+    )
+    one, other = dmoc.solve(transfer), dmoc.solve(mission)
+    assert [level.iterations for level in one.ladder] == [level.iterations for level in other.ladder]
+    assert np.array_equal(one.position, other.position)
+    assert one.evaluations == other.evaluations
+
+
+def test_a_file_holds_a_mission_to_the_last_bit(tmp_path):
+    found = dmoc.solve(hohmann())
+    found.save(tmp_path / "hohmann.nc")
+    back = dmoc.load(tmp_path / "hohmann.nc").attach(hohmann())
+    assert np.array_equal(back.position, found.position)
+    assert back.objective == found.objective and back.ladder == found.ladder
+    assert [kick.size for kick in back.impulses] == [kick.size for kick in found.impulses]
+    assert [(one.name, one.value) for one in dmoc.verify(back).checks] == [
+        (one.name, one.value) for one in dmoc.verify(found).checks
+    ]
+    again = dmoc.solve(hohmann(), guess=back)
+    assert again.success and again.iterations < 6
+
+
+@pytest.mark.parametrize("what", ["velocity", "impulse", "time", "mass"])
+def test_a_corrupted_joint_fails(what):
+    found = dmoc.solve(rocket()) if what == "mass" else dmoc.solve(hohmann() if what == "impulse" else gates())
+    first = found.legs[-1]
+    path = first.path
+    if what == "velocity":
+        path = replace(path, start_velocity=path.start_velocity + 1e-4)
+    elif what == "mass":
+        path = replace(path, mass=path.mass + 1e-4)
+    broken = replace(found, legs=(*found.legs[:-1], replace(first, path=path)))
+    if what == "impulse":
+        broken = replace(found, own={name: values * 1.001 for name, values in found.own.items()})
+    if what == "time":
+        later = replace(first.provenance, start_time=first.provenance.start_time + 1e-3)
+        broken = replace(found, legs=(*found.legs[:-1], replace(first, provenance=later)))
+    assert dmoc.verify(found)["joints"].ok
+    assert not dmoc.verify(broken)["joints"].ok
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"legs": []}, "legs has no leg"),
+        ({"legs": [Leg(1.0), 3]}, "legs must be a sequence of dmoc.Leg"),
+        ({"legs": [Leg()]}, "a leg has no duration and neither has the mission"),
+        ({"legs": [Leg(5.0)], "duration": 2.0}, "the legs last 5 to 5 s together, but the mission 2 to 2 s"),
+        ({"legs": [Leg((2.0, 1.0))]}, "its shortest must be less than its longest"),
+        ({"legs": [Impulse(), Leg(1.0)]}, "an impulse without a limit costs nothing with Effort"),
+        ({"legs": [Leg(1.0), Via((1, 2, 3)), Leg(1.0)]}, "its condition has 3 axes but the mission 2"),
+        ({"start_time": (3.0, 1.0)}, "start_time must be one time or (earliest, latest)"),
+    ],
+)
+def test_what_has_no_meaning_is_refused_in_one_line(change, words):
+    given = {"mass": 1.0, "start": State((0, 0), (0, 0)), "goal": State((1, 0), (0, 0)), "legs": [Leg(1.0)]}
+    with pytest.raises(ValueError, match=r"(?s).*") as error:
+        Mission(**given | change)
+    assert words in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_mission_that_cannot_be_is_reported_with_its_leg():
+    mission = replace(gates(False), actuator=BallForce(1.0))
+    found = dmoc.solve(mission)
+    assert not found.success
+    assert any(name.startswith(("leg 1", "leg 2", "joint 1", "goal")) for name, _, _ in found.worst)
