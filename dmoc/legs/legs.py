@@ -54,7 +54,7 @@ class Coast(Leg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.actuator is not None:
+        if self.actuator not in (None, Unpowered()):
             raise ValueError("Coast: there is no actuator in a coast; use Leg(duration, actuator=...)")
         checked(self, actuator=Unpowered())
 

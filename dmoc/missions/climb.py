@@ -31,11 +31,13 @@ ORDER = 6
 # A leg has this many steps at each order, if no number is asked for.
 STEPS = {2: 80, 4: 24, 6: 12, 8: 10}
 # An attempt from a guess ends after this many iterations.
-MOST_TRYING = 500
+MOST_TRYING = 200
 # A mesh is refined if its steps err by more than this part of the path [-], at most so many times.
 ACCURATE, MOST_MENDED = 1e-5, 3
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
+# Where there are more than two impulses their rounding falls to this in powers of ten [-].
+LEAST_WIDTH = 1e-6
 # Where an attempt fails, the free durations are tried so many times as long.
 OTHER_DURATIONS = (0.5, 2.0, 0.25, 4.0)
 
@@ -72,7 +74,7 @@ class Climb:
         """Solve on the meshes of a path."""
         begun, mission = time.perf_counter(), self.mission
         problems = [_rounded(problem, rounding) for problem in mission.stretches]
-        program = MissionProgram.of(mission, problems, path)
+        program = MissionProgram.of(mission, problems, path, rounding)
         watch = self._watch(program)
         limits = {} if most is None else {"ipopt.max_iter": most}
         built = time.perf_counter() - begun
@@ -126,7 +128,7 @@ class Climb:
         return tried
 
     def _stages(self) -> list[float | None]:
-        """Widths of the rounding of |F|, from wide to what is asked for."""
+        """Widths of the rounding of |F| and of impulses, from wide to what is asked for."""
         # An engine that always burns fully never comes to zero, where |F| is rounded.
         engines = [leg.actuator for leg in self.mission.stretches]
         own = [
@@ -134,6 +136,9 @@ class Climb:
             for one in engines
             if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
         ]
+        if sum(len(event.unknowns(1)) for joint in self.mission.joints for event in joint.events) > 2:
+            # One of several impulses may be none at the optimum.
+            own.append(LEAST_WIDTH)
         if not own:
             return [None]
         count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / min(own)))), 0)
@@ -231,7 +236,7 @@ def _first_path(mission: Mission, order: int | None, steps: int | None, hold: bo
     orders = [leg.order or order or ORDER for leg in mission.plan]
     counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
     path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
-    return path if steps else guessed(mission, _meshes(mission, path, order, steps), hold, given)
+    return path if steps else path.onto(_meshes(mission, path, order, steps))
 
 
 def _meshes(

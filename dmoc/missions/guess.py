@@ -10,6 +10,8 @@ import numpy as np
 
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
+from dmoc.legs.legs import both_ends
+from dmoc.missions.arcs import cheapest_arc
 from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
@@ -34,13 +36,12 @@ def guessed(
     durations = likely_durations(mission)
     if (path := getattr(given, "mission_path", given)) is not None and isinstance(path, MissionPath):
         return path.onto(meshes)
-    begin = (
-        mission.start_bounds[0]
-        if not isinstance(mission.start_time, tuple)
-        else float(np.mean(mission.start_time))
-    )
+    arc = cheapest_arc(mission) if given is None else None
+    begin = float(np.mean(mission.start_bounds))
+    if arc is not None:
+        begin, durations = arc.begin, likely_durations(mission, arc.duration)
     begins = begin + np.append(0.0, np.cumsum(durations))
-    places = _places(mission, durations, begins, given)
+    places = _places(mission, durations, begins, given) if arc is None else arc.places
     legs, mass, own = [], float(mission.mass), {}
     for i, (problem, (mesh, order)) in enumerate(zip(mission.stretches, meshes, strict=True)):
         mass = _after(mission, i, mass)
@@ -52,14 +53,14 @@ def guessed(
     return MissionPath(tuple(legs), tuple(float(t) for t in begins[:-1]), own)
 
 
-def likely_durations(mission: Mission) -> np.ndarray:
-    """A duration for each leg within its bounds, that add up to one of the mission [s]."""
+def likely_durations(mission: Mission, total: float | None = None) -> np.ndarray:
+    """A duration for each leg within its bounds, that add up to `total` or to one of the mission [s]."""
     bounds = np.array([leg.duration_bounds for leg in mission.stretches])
     middle = np.sqrt(bounds[:, 0] * bounds[:, 1])
-    if mission.duration is None:
-        return middle
-    low, high = mission.duration if isinstance(mission.duration, tuple) else (mission.duration,) * 2
-    total = float(np.clip(middle.sum(), low, high))
+    if total is None:
+        if mission.duration is None:
+            return middle
+        total = float(np.clip(middle.sum(), *both_ends(mission.duration)))
     free = bounds[:, 0] < bounds[:, 1]
     durations = np.where(free, np.maximum(middle, (total - middle[~free].sum()) / max(free.sum(), 1)), middle)
     for _ in range(len(durations)):

@@ -1,4 +1,4 @@
-"""The rows, unknowns and cost of one joint: states of the legs beside it, and what happens between them.
+"""The rows, unknowns and cost of a joint, and the rows of a mission as a whole.
 
 At a joint the discrete equations of both legs hold with their own boundary velocities: the last momentum of the
 leg before equals dl/dv at v-, the first of the leg behind it minus dl/dv at v+. Together with v+ = v- + dv they
@@ -17,7 +17,8 @@ import numpy as np
 
 from dmoc.configurations.base import Configuration
 from dmoc.legs.events import Instant, condition_rows
-from dmoc.legs.legs import Joint
+from dmoc.legs.legs import Joint, both_ends
+from dmoc.missions.path import MissionPath
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
@@ -45,8 +46,17 @@ class Placed:
 class JointWriter:
     """The formulas of one joint while they are being written down; see `written`."""
 
-    def __init__(self, mission: Mission, joint: Joint, legs: Sequence[Placed], own: Layout, first: int):
-        self.mission, self.joint, self.legs, self.own, self.first = mission, joint, legs, own, first
+    def __init__(
+        self,
+        mission: Mission,
+        joint: Joint,
+        legs: Sequence[Placed],
+        own: tuple[Layout, int],
+        rounding: float | None = None,
+    ):
+        self.mission, self.joint, self.legs = mission, joint, legs
+        self.own, self.first = own
+        self.rounding = ROUNDED if rounding is None else rounding
         self._symbols: list[ca.SX] = []
         self._places: list[np.ndarray] = []
         self.rows: list[Row] = []
@@ -106,7 +116,7 @@ class JointWriter:
         if joint.left is None and joint.boundary is not None:
             self.rows += _named("start", condition_rows(joint.boundary, here))
         units = self.beside.program.units
-        tiny = ROUNDED * units.length / units.time
+        tiny = self.rounding * units.length / units.time
         for i, event in enumerate(joint.events):
             own = self.take_own(f"event {i}") if event.unknowns(1) else ca.SX(0, 1)
             passed = event.passed(here, own, speeds, tiny)
@@ -173,3 +183,46 @@ def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
             scale = np.array([[units.of(unit) for _, unit in known]])
             layout = layout.add(f"event {i}", "end", [name for name, _ in known], 1, scale)
     return layout
+
+
+def row_to_drop(mission: Mission, path: MissionPath) -> int:
+    """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
+    return int(np.argmax(np.abs(path.legs[0].start_velocity)))
+
+
+def whole_rows(mission: Mission, legs: Sequence[Placed], drop: int) -> tuple[list[Row], np.ndarray, ca.SX]:
+    """Rows of the mission as a whole: its duration, and that its path closes."""
+    pool: dict[tuple[int, ...], ca.SX] = {}
+
+    def take(places: np.ndarray) -> ca.SX:
+        return pool.setdefault(tuple(places), ca.SX.sym("x", len(places)))
+
+    first, last = legs[0], legs[-1]
+    rows: list[Row] = []
+    spans = list(mission.sums)
+    if mission.duration is not None:
+        spans.append((0, len(legs) - 1, mission.duration))
+    for begin, end, span in spans:
+        total = ca.SX(0)
+        if begin < end:
+            total = take(legs[end].at(LEG_START, 0)) - take(legs[begin].at(LEG_START, 0))
+        free = "duration" in legs[end].program.columns
+        lasts = take(legs[end].at("duration", 0)) if free else legs[end].program.problem.duration_bounds[0]
+        rows.append(Row("duration", total + lasts, *both_ends(span), "s"))
+    if mission.closes:
+        begin = take(first.at("position", 0)) + first.program.units.origin
+        end = take(last.at("position", -1)) + last.program.units.origin
+        gap = take(last.at("goal.velocity", 0)) - take(first.at("start.velocity", 0))
+        body = first.program.dynamics.configuration
+        away = body.along(begin, end - begin)
+        rows += [
+            Row(f"closed.position.{name}", away[i], 0.0, 0.0, "m") for i, name in enumerate(body.velocity_names)
+        ]
+        rows += [
+            Row(f"closed.velocity.{name}", gap[i], 0.0, 0.0, "m/s")
+            for i, name in enumerate(body.velocity_names)
+            if i != drop
+        ]
+    if not rows:
+        return [], np.zeros(0, int), ca.SX(0, 1)
+    return rows, np.concatenate([*map(np.array, pool)]), ca.vertcat(*pool.values())

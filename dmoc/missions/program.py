@@ -9,9 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.joining import JointWriter, Placed, own_unknowns
+from dmoc.missions.joining import JointWriter, Placed, own_unknowns, row_to_drop, whole_rows
 from dmoc.missions.path import MissionPath, kick_cost
-from dmoc.missions.whole import row_to_drop, whole_rows
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
@@ -50,8 +49,17 @@ class MissionProgram:
     drop: int = -1
 
     @classmethod
-    def of(cls, mission: Mission, problems: Sequence[TransferProblem], path: MissionPath) -> MissionProgram:
-        """The program of a mission whose legs are these problems, on the meshes of a path."""
+    def of(
+        cls,
+        mission: Mission,
+        problems: Sequence[TransferProblem],
+        path: MissionPath,
+        rounding: float | None = None,
+    ) -> MissionProgram:
+        """The program of a mission whose legs are these problems, on the meshes of a path.
+
+        The size of an impulse is rounded at zero over the part `rounding` of the unit of speed [-].
+        """
         sizes = [units_of(problem, leg) for problem, leg in zip(problems, path.legs, strict=True)]
         cost = max(kick_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
         legs, blocks, at = [], [], np.zeros(3, int)
@@ -67,7 +75,7 @@ class MissionProgram:
             beside = legs[joint.right if joint.left is None else joint.left].program  # type: ignore[index]
             layout = own_unknowns(joint, beside, mission.mass)
             own[joint.name] = (layout, columns)
-            writer = JointWriter(mission, joint, legs, layout, columns)
+            writer = JointWriter(mission, joint, legs, own[joint.name], rounding)
             writer.write()
             columns += layout.size
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)

@@ -49,6 +49,8 @@ class Mission:
         Starting guess of the path over the whole mission, as of a `TransferProblem`.
     inertia : 3 floats or 3x3 floats, optional
         As of a `TransferProblem`.
+    sums : tuple of (int, int, float or (float, float)), optional
+        Durations of several legs together [s]: the first and the last of them, counted from 0, and how long.
 
     Raises
     ------
@@ -68,6 +70,7 @@ class Mission:
     start_time: Any = 0.0
     guess: Any = None
     inertia: Any = None
+    sums: tuple[tuple[int, int, Any], ...] = ()
     name: str = field(default="mission", compare=False)
     parameters: dict = field(default_factory=dict, compare=False)
 
