@@ -49,7 +49,9 @@ def lambert(
     v0, v1 : arrays, shape (count, 3)
         [m/s]; NaN where there is no such coast.
     """
-    start, goal, normal = np.broadcast_arrays(*(np.atleast_2d(each).astype(float) for each in (start, goal, normal)))
+    start, goal, normal = np.broadcast_arrays(
+        *(np.atleast_2d(each).astype(float) for each in (start, goal, normal))
+    )
     near, far = np.linalg.norm(start, axis=1), np.linalg.norm(goal, axis=1)
     chord = np.linalg.norm(goal - start, axis=1)
     half = 0.5 * (near + far + chord)

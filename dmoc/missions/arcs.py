@@ -79,7 +79,9 @@ def _grid(span: tuple[float, float], count: int, spaced: Any) -> np.ndarray:
 
 def _whole_span(mission: Mission) -> tuple[float, float]:
     """Shortest and longest duration of all legs together [s], as the mission lets them."""
-    shortest, longest = (sum(side) for side in zip(*(leg.duration_bounds for leg in mission.stretches), strict=True))
+    shortest, longest = (
+        sum(side) for side in zip(*(leg.duration_bounds for leg in mission.stretches), strict=True)
+    )
     if mission.duration is None:
         return shortest, longest
     low, high = both_ends(mission.duration)

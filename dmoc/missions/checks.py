@@ -124,7 +124,9 @@ class _Whole:
                     left = max(left, float(np.abs(part / weights[:, None]).max(initial=0.0)))
                 else:
                     left = max(left, float(np.abs(np.cumsum(part, axis=0)).max(initial=0.0)))
-        rest = self.slope[program.legs[-1].columns + program.legs[-1].program.columns.size :]
+        # Of an impulse that is none the primer vector says whether it may be one.
+        rest = np.delete(self.slope, program.idle_places())
+        rest = rest[program.legs[-1].columns + program.legs[-1].program.columns.size :]
         left = max(left, float(np.abs(rest).max(initial=0.0)))
         for multipliers, values, lower, upper in (
             (self.lam_x, self.x, *lbx_ubx[:2]),

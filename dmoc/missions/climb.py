@@ -38,6 +38,8 @@ ACCURATE, MOST_MENDED = 1e-5, 3
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
 LEAST_WIDTH = 1e-6
+# An impulse below so many times its rounding is none, once that is narrow enough [-].
+IDLE, NARROW = 10.0, 1e-4
 # Where an attempt fails, the free durations are tried so many times as long.
 OTHER_DURATIONS = (0.5, 2.0, 0.25, 4.0)
 
@@ -125,6 +127,8 @@ class Climb:
             if not tried.solved:
                 return tried
             path = tried.path
+            if width is not None and width <= NARROW:
+                path = path.without_idle(self.mission, IDLE * width * path.diagonal / path.duration)
         return tried
 
     def _stages(self) -> list[float | None]:
@@ -220,8 +224,7 @@ def solve_mission(
         first = climb.attempt(path) if path.warm else climb.from_guess(path)
         if not first.solved:
             return answered(climb, first)
-        if steps is None:
-            first = climb.regraded(first, _meshes(mission, first.path, order, steps))
+        first = climb.regraded(first, _meshes(mission, first.path, order, steps))
         if steps is not None and tol is None:
             return answered(climb, first)
         return answered(climb, *climb.refined(first, tol), tol)
@@ -236,7 +239,7 @@ def _first_path(mission: Mission, order: int | None, steps: int | None, hold: bo
     orders = [leg.order or order or ORDER for leg in mission.plan]
     counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
     path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
-    return path if steps else path.onto(_meshes(mission, path, order, steps))
+    return path.onto(_meshes(mission, path, order, steps))
 
 
 def _meshes(

@@ -185,7 +185,7 @@ def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
     return layout
 
 
-def row_to_drop(mission: Mission, path: MissionPath) -> int:
+def row_to_drop(path: MissionPath) -> int:
     """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
     return int(np.argmax(np.abs(path.legs[0].start_velocity)))
 

@@ -29,12 +29,35 @@ class MissionPath:
         Unknowns of the joints themselves, by the name of the joint [SI].
     forces : dict of array
         Multipliers of the rows of the joints [objective per unit of the row], by the name of the joint.
+    near : bool
+        Whether it is nearly an answer, so that a solve had better stay close to it.
+    idle : tuple of str
+        Joints whose impulse is none, and stays none: the size of an impulse has no derivative at zero.
     """
 
     legs: tuple[DiscretePath, ...]
     begins: tuple[float, ...]
     own: dict[str, np.ndarray] = field(default_factory=dict)
     forces: dict[str, np.ndarray] = field(default_factory=dict)
+    near: bool = False
+    idle: tuple[str, ...] = ()
+
+    def without_idle(self, mission: Mission, nothing: float) -> MissionPath:
+        """The same with impulses below a speed [m/s] as none, but for the last one."""
+        sizes = {
+            joint.name: max(map(np.linalg.norm, kicks))
+            for joint in mission.joints
+            if (kicks := kicks_of(joint, self.own.get(joint.name), mission.dimension))
+        }
+        idle = tuple(name for name, size in sizes.items() if size < nothing)
+        if not idle or len(idle) == len(sizes):
+            return self
+        own = dict(self.own)
+        for name in idle:
+            joint = next(joint for joint in mission.joints if joint.name == name)
+            count = sum(map(len, kicks_of(joint, own[name], mission.dimension)))
+            own[name] = np.append(own[name][: len(own[name]) - count], np.zeros(count))
+        return replace(self, own=own, idle=idle)
 
     @property
     def warm(self) -> bool:
@@ -45,6 +68,11 @@ class MissionPath:
     def place(self) -> np.ndarray:
         """Places at the nodes of all legs [m]."""
         return np.concatenate([leg.place for leg in self.legs])
+
+    @property
+    def duration(self) -> float:
+        """Duration of all legs [s]."""
+        return float(sum(leg.duration for leg in self.legs))
 
     @property
     def diagonal(self) -> float:

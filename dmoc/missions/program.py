@@ -16,7 +16,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
 from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
-from dmoc.nlp.ipopt_options import rounding, settings_for
+from dmoc.nlp.ipopt_options import NEAR, rounding, settings_for
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
@@ -28,6 +28,8 @@ from dmoc.scene.problem import TransferProblem
 
 # The rows that belong to no joint are in the group of this name.
 WHOLE = "mission"
+# The barrier parameter and the distances from limits begin with this where a path is nearly an answer [-].
+CLOSE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class MissionProgram:
     blocks: tuple[Block, ...]
     cost: float
     leg_blocks: int
-    drop: int = -1
+    idle: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -80,8 +82,7 @@ class MissionProgram:
             columns += layout.size
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
-        drop = row_to_drop(mission, path)
-        whole, places, expressions = whole_rows(mission, legs, drop)
+        whole, places, expressions = whole_rows(mission, legs, row_to_drop(path))
         rows = _add(rows, WHOLE, whole, _largest([leg.program.units for leg in legs]), bounds)
         blocks += [
             writer.written(rows, first_row)
@@ -96,7 +97,16 @@ class MissionProgram:
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
         return cls(
-            mission, tuple(legs), own, rows, first_row, (lower, upper), tuple(blocks), cost, leg_blocks, drop
+            mission,
+            tuple(legs),
+            own,
+            rows,
+            first_row,
+            (lower, upper),
+            tuple(blocks),
+            cost,
+            leg_blocks,
+            path.idle,
         )
 
     @property
@@ -133,8 +143,10 @@ class MissionProgram:
         parts = [list(leg.program.bounds(leg.program.problem)) for leg in self.legs]
         for i, (leg, sides) in enumerate(zip(self.legs, parts, strict=True)):
             self._open_leg(i, leg.program, sides)
-        count = self.sizes[0] - sum(len(sides[0]) for sides in parts)
-        free = np.full(count, np.inf)
+        free = np.full(sum(layout.size for layout, _ in self.own.values()), np.inf)
+        first = self.sizes[0] - len(free)
+        for place in self.idle_places():
+            free[place - first] = 0.0
         lower, upper, low, high = (list(side) for side in zip(*parts, strict=True))
         return (
             np.concatenate([*lower, -free]),
@@ -142,6 +154,15 @@ class MissionProgram:
             np.concatenate([*low, self.row_bounds[0]]),
             np.concatenate([*high, self.row_bounds[1]]),
         )
+
+    def idle_places(self) -> list[int]:
+        """The unknowns of impulses that are none and stay none."""
+        found = []
+        for name in self.idle:
+            layout, begin = self.own[name]
+            groups = [group for group in layout.groups if group.name.startswith("event")]
+            found += [begin + place for group in groups for place in range(group.start, group.stop)]
+        return found
 
     def _open_leg(self, index: int, program: Program, sides: list[np.ndarray]) -> None:
         """Let a joint decide on the mass and the time at the start of a leg, unless the mission fixes them."""
@@ -208,7 +229,7 @@ class MissionProgram:
             * self.cost
             for group in self.rows.groups
         }
-        return MissionPath(tuple(legs), tuple(begins), own, forces)
+        return MissionPath(tuple(legs), tuple(begins), own, forces, idle=self.idle)
 
     def solve(
         self,
@@ -221,7 +242,9 @@ class MissionProgram:
         """One run of Ipopt from a path on these meshes."""
         lbx, ubx, lbg, ubg = self.bounds()
         lam_x, lam_g = self.multipliers(path)
-        solver = make_solver(self.assembly(compiled), self.settings(path.warm, carried), options, watch)
+        solver = make_solver(
+            self.assembly(compiled), self.settings(path.warm, carried, path.near), options, watch
+        )
         given = {"x0": np.clip(self.pack(path), lbx, ubx), "lam_x0": lam_x, "lam_g0": lam_g}
         bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg, "p": self.parameters()}
         return run(solver, self._rounding, **given, **bounds)
@@ -230,7 +253,7 @@ class MissionProgram:
     def _rounding(self) -> float:
         return max(rounding(leg.program.mesh, leg.program.scheme.degree) for leg in self.legs)
 
-    def settings(self, warm: bool, carried: bool) -> dict[str, Any]:
+    def settings(self, warm: bool, carried: bool, near: bool = False) -> dict[str, Any]:
         """Options of Ipopt: those of the legs, the loosest tolerance among them."""
         each = [
             settings_for(leg.program.problem, leg.program.mesh, leg.program.scheme.degree, warm, carried)
@@ -239,6 +262,9 @@ class MissionProgram:
         merged: dict[str, Any] = {}
         for settings in each:
             merged |= settings
+        if near and not warm:
+            # A barrier of the usual size would lead away from a path that is nearly an answer.
+            merged |= dict.fromkeys(NEAR, CLOSE)
         return merged | {"ipopt.tol": max(settings["ipopt.tol"] for settings in each)}
 
     def name_of(self, place: int, column: bool) -> str:

@@ -85,7 +85,12 @@ class MissionSolution:
     def path(self) -> MissionPath:
         """The paths of all legs with their multipliers, good to start from."""
         begins = tuple(leg.provenance.start_time for leg in self.legs)
-        return MissionPath(tuple(leg.path for leg in self.legs), begins, self.own, self.forces)
+        by_joint: dict[str, float] = {}
+        for kick in self.impulses:
+            by_joint[kick.joint] = max(by_joint.get(kick.joint, 0.0), kick.size)
+        idle = tuple(name for name, size in by_joint.items() if size == 0.0)
+        legs = tuple(leg.path for leg in self.legs)
+        return MissionPath(legs, begins, self.own, self.forces, idle=idle)
 
     @property
     def order(self) -> int:

@@ -84,7 +84,7 @@ def _with_another(found: MissionSolution) -> tuple[Mission, MissionPath] | None:
         _renamed(found.require_problem(), name, lambda i: i + 1 if i > index else i): values
         for name, values in path.own.items()
     }
-    return mission, MissionPath(legs, begins, own | {f"joint {index + 1}": kick})
+    return mission, MissionPath(legs, begins, own | {f"joint {index + 1}": kick}, near=True)
 
 
 def _renamed(mission: Mission, name: str, moved: Callable[[int], int]) -> str:
@@ -158,5 +158,5 @@ def _merged(found: MissionSolution, joint: int) -> tuple[Mission, MissionPath]:
         if name != f"joint {joint}"
     }
     begins = (*path.begins[:joint], *path.begins[joint + 1 :])
-    new = MissionPath((*path.legs[: joint - 1], one, *path.legs[joint + 1 :]), begins, own)
+    new = MissionPath((*path.legs[: joint - 1], one, *path.legs[joint + 1 :]), begins, own, near=True)
     return replace(mission, legs=legs, sums=tuple(sums)), new
