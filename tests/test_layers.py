@@ -27,6 +27,7 @@ LAYERS = [
     ["diagnosis"],
     ["solver", "checks"],
     ["missions"],
+    ["structure"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
     ["cli"],

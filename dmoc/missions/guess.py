@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.arguments import short
+from dmoc.basics.plain import unbroken
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.legs.legs import both_ends
@@ -33,9 +35,9 @@ def guessed(
     From `given`, a path over the whole mission as a function of the time or as arrays, else from the physics:
     straight lines and coasts between the places that are known.
     """
-    durations = likely_durations(mission)
-    if (path := getattr(given, "mission_path", given)) is not None and isinstance(path, MissionPath):
-        return path.onto(meshes)
+    given = _checked_guess(mission, given)
+    total = float(np.ptp(given[0])) if isinstance(given, tuple) else None
+    durations = likely_durations(mission, total)
     arc = cheapest_arc(mission) if given is None else None
     begin = float(np.mean(mission.start_bounds))
     if arc is not None:
@@ -51,6 +53,31 @@ def guessed(
         if (values := _own(mission, joint, legs)) is not None:
             own[joint.name] = values
     return MissionPath(tuple(legs), tuple(float(t) for t in begins[:-1]), own)
+
+
+def _checked_guess(mission: Mission, given: Any) -> Any:
+    """A function of time, arrays (times, positions), or None; ValueError for anything else."""
+    size = len(mission.stretches[0].start.fixed()[0])
+    try:
+        if given is None:
+            return None
+        if callable(given):
+            sample = np.ravel(np.asarray(given(float(mission.start_bounds[0])), float))[None]
+            found: Any = given
+        else:
+            times, sample = np.asarray(given[0], float), np.asarray(given[1], float)
+            sample = sample.reshape(len(times), -1)
+            found = times, sample
+            if not (np.diff(times) > 0).all():
+                raise ValueError("its times do not increase")
+        if sample.shape[1] != size or not np.isfinite(sample).all():
+            raise ValueError(f"it has {sample.shape[1]} axes, and needs {size} finite numbers a time")
+    except Exception as error:  # whatever a user's function raises
+        raise ValueError(
+            "guess must be a function of the time [s] that gives positions [m], arrays (times, positions), or "
+            f"a former solution; {short(given)} fails: {unbroken(error)[:120]}"
+        ) from error
+    return found
 
 
 def likely_durations(mission: Mission, total: float | None = None) -> np.ndarray:
@@ -78,7 +105,7 @@ def _places(
     if callable(given):
         return lambda times: np.array([np.ravel(np.asarray(given(float(t)), float)) for t in times])
     if given is not None:
-        known, values = np.asarray(given[0], float), np.asarray(given[1], float).reshape(len(given[0]), -1)
+        known, values = given
         return lambda times: np.stack([np.interp(times, known, column) for column in values.T], axis=1)
     knots = _known(mission, begins)
     found = []

@@ -19,11 +19,18 @@ from dmoc.configurations.base import Configuration
 from dmoc.legs.events import Instant, condition_rows
 from dmoc.legs.legs import Joint, both_ends
 from dmoc.missions.path import MissionPath
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
+from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row, snake
 from dmoc.scene.mission import Mission
+from dmoc.scene.problem import TransferProblem
 
 # The size of an impulse is rounded at zero over this part of the unit of speed [-].
 ROUNDED = 1e-8
@@ -41,6 +48,27 @@ class Placed:
     def at(self, group: str, place: int) -> np.ndarray:
         """Unknowns of the mission that are one entry of a group of this leg."""
         return self.columns + self.program.columns[group].indices[:, place]
+
+
+def leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
+    """A leg without its sparse derivatives, its blocks, and how many parameters they have."""
+    rule = scheme(path.order)
+    stencils = stencils_of(problem, path.order, path.hold, joined=True)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
+    none: Any = None
+    program = Program(
+        problem,
+        Dynamics.of(problem),
+        rule,
+        path.hold,
+        path.mesh,
+        units,
+        placed.columns,
+        placed.rows,
+        placed.row_bounds,
+        none,
+    )
+    return program, placed.blocks, stencils.parameter_count
 
 
 class JointWriter:

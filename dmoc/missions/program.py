@@ -9,18 +9,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.joining import JointWriter, Placed, own_unknowns, row_to_drop, whole_rows
+from dmoc.missions.joining import JointWriter, Placed, leg_program, own_unknowns, row_to_drop, whole_rows
 from dmoc.missions.path import MissionPath, kick_cost
-from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
 from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
 from dmoc.nlp.ipopt_options import NEAR, rounding, settings_for
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
-from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
-from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
@@ -66,7 +61,7 @@ class MissionProgram:
         cost = max(kick_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
         legs, blocks, at = [], [], np.zeros(3, int)
         for problem, leg, unit in zip(problems, path.legs, sizes, strict=True):
-            program, mine, parameters = _leg_program(problem, leg, replace(unit, cost=cost))
+            program, mine, parameters = leg_program(problem, leg, replace(unit, cost=cost))
             legs.append(Placed(program, *map(int, at)))
             blocks += [block.moved(*map(int, at)) for block in mine]
             at += (program.columns.size, program.rows.size, parameters)
@@ -288,26 +283,6 @@ class MissionProgram:
             found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
         found.sort(reverse=True)
         return [(self.name_of(place, column), size, "scaled") for size, place, column in found[:count]]
-
-
-def _leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
-    rule = scheme(path.order)
-    stencils = stencils_of(problem, path.order, path.hold, joined=True)
-    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
-    none: Any = None
-    program = Program(
-        problem,
-        Dynamics.of(problem),
-        rule,
-        path.hold,
-        path.mesh,
-        units,
-        placed.columns,
-        placed.rows,
-        placed.row_bounds,
-        none,
-    )
-    return program, placed.blocks, stencils.parameter_count
 
 
 def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:

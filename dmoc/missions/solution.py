@@ -122,6 +122,12 @@ class MissionSolution:
         return np.concatenate([leg.position for leg in self.legs])
 
     @property
+    def attitude(self) -> np.ndarray | None:
+        """Attitudes at all nodes, as of a `Solution`; None for a point mass."""
+        found = [leg.attitude for leg in self.legs]
+        return None if found[0] is None else np.concatenate([each for each in found if each is not None])
+
+    @property
     def iterations(self) -> int:
         return sum(level.iterations for level in self.ladder)
 

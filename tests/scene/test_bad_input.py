@@ -364,7 +364,7 @@ def as_mission(part):
     if isinstance(part, Free):
         part = Mission(1.0, HERE.start, part, [Leg(1.0), Leg(1.0)])
     if isinstance(part, Mission):
-        path = guessed(part, [(np.linspace(0, 1, 4), 4)] * len(part.plan))
+        path = guessed(part, [(np.linspace(0, 1, 4), 4)] * len(part.plan), given=part.guess)
         MissionProgram.of(part, part.stretches, path)
     return part if isinstance(part, Mission) else None
 
