@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import casadi as ca
@@ -78,7 +79,9 @@ class MissionProgram:
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
         whole, places, expressions = whole_rows(mission, legs, row_to_drop(path))
-        rows = _add(rows, WHOLE, whole, _largest([leg.program.units for leg in legs]), bounds)
+        rows = _add(
+            rows, WHOLE, whole, max((leg.program.units for leg in legs), key=attrgetter("time")), bounds
+        )
         blocks += [
             writer.written(rows, first_row)
             for writer in writers
@@ -254,9 +257,7 @@ class MissionProgram:
             settings_for(leg.program.problem, leg.program.mesh, leg.program.scheme.degree, warm, carried)
             for leg in self.legs
         ]
-        merged: dict[str, Any] = {}
-        for settings in each:
-            merged |= settings
+        merged: dict[str, Any] = {name: value for settings in each for name, value in settings.items()}
         if near and not warm:
             # A barrier of the usual size would lead away from a path that is nearly an answer.
             merged |= dict.fromkeys(NEAR, CLOSE)
@@ -289,7 +290,7 @@ def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list
     """The layout of joints with one more group, whose scaled bounds are put behind the others."""
     if not new:
         return rows
-    scale = np.array([[1 / _unit(units, row.unit) for row in new]])
+    scale = np.array([[1 / units.of(row.unit) for row in new]])
     bounds.append(
         (
             np.array([row.lower for row in new]) * scale.ravel(),
@@ -297,11 +298,3 @@ def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list
         )
     )
     return rows.add(name, "end", [row.name for row in new], 1, scale, None, [row.unit for row in new])
-
-
-def _unit(units: Units, unit: str) -> float:
-    return units.time if unit == "s" else units.of(unit)
-
-
-def _largest(units: Sequence[Units]) -> Units:
-    return max(units, key=lambda unit: unit.time)

@@ -33,7 +33,7 @@ class Units:
     def sizes(self) -> dict[str, float]:
         """The size of a number near 1, by its unit."""
         speed, rate = self.length / self.time, 1 / self.time
-        known = {"m": self.length, "m/s": speed, "rad": 1.0, "rad/s": rate, "kg": self.mass}
+        known = {"m": self.length, "m/s": speed, "rad": 1.0, "rad/s": rate, "kg": self.mass, "s": self.time}
         return known | {"N": self.force, "N m": self.torque, "N m s": self.torque * self.time}
 
     def of(self, unit: str) -> float:
