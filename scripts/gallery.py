@@ -16,10 +16,10 @@ from PIL import Image
 
 from dmoc import solve, sweep, verify
 from dmoc.basics.docstrings import first_line
+from dmoc.charts.stability import stability_figure
+from dmoc.charts.study import save_page
+from dmoc.charts.sweep import sweep_figure
 from dmoc.plots.page import save_figure
-from dmoc.plots.stability import stability_figure
-from dmoc.plots.study import save_page
-from dmoc.plots.sweep import sweep_figure
 from dmoc.results.solution import Solution
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.drift import drift, kepler, per_revolution

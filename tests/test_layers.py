@@ -30,6 +30,7 @@ LAYERS = [
     ["structure"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
+    ["charts"],
     ["cli"],
 ]
 FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}

@@ -166,7 +166,7 @@ def plot(
     target = file.with_suffix(".png") if out is None else out
     writable(target, drawn=True)
     if sweep_data.is_sweep(file):
-        from dmoc.plots.sweep import save_sweep
+        from dmoc.charts.sweep import save_sweep
 
         save_sweep(sweep_data.read_sweep(file), target)
     else:

@@ -46,8 +46,8 @@ def stability(
         runs = [(orbit.name, drift(orbit, revolutions, methods)) for orbit, methods in orbits]
         turns = [(body.name, spin(body, turned)) for body in (free_body(), heavy_top())]
     if plot is not None:
-        from dmoc.plots.stability import stability_figure
-        from dmoc.plots.study import save_page
+        from dmoc.charts.stability import stability_figure
+        from dmoc.charts.study import save_page
 
         save_page(stability_figure(runs, rounding, edges), plot)
     if as_json:

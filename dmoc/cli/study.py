@@ -44,7 +44,7 @@ def study(
 
     Medians of several runs; whatever else the computer does makes them longer.
     """
-    from dmoc.plots.study import save_study
+    from dmoc.charts.study import save_study
     from dmoc.reports import study as report_study
     from dmoc.reports import words as report
     from dmoc.scene.problem_file import load_problem, parse_settings

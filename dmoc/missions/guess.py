@@ -165,7 +165,8 @@ def _leg(
         )
         if full is not None:
             flow = np.asarray(problem.actuator.flow(full[0]), float).item()
-            share = min(1.0, (1 - LEAST_MASS) * mass / (flow * duration))
+            # A guess that stands still has no direction to push in, and burns nothing.
+            share = min(1.0, (1 - LEAST_MASS) * mass / (flow * duration)) if flow else 1.0
             masses, control = mass - share * flow * duration * fractions, share * full
     if hold:
         rule = scheme(order)

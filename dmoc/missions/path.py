@@ -75,6 +75,11 @@ class MissionPath:
         return float(sum(leg.duration for leg in self.legs))
 
     @property
+    def mass(self) -> np.ndarray:
+        """Masses at the nodes of all legs [kg]."""
+        return np.concatenate([leg.mass for leg in self.legs])
+
+    @property
     def diagonal(self) -> float:
         """Diagonal of the box around the path [m]."""
         return float(np.linalg.norm(np.ptp(self.place, axis=0)))

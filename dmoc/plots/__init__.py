@@ -1,1 +1,1 @@
-"""Pictures of solutions, sweeps and studies."""
+"""Pictures of solutions, of transfers and of missions."""

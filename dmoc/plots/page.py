@@ -10,7 +10,6 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.basics.files import as_path, whole_file
-from dmoc.parts.objectives import Objective
 from dmoc.plots.ledger import draw_ledger
 from dmoc.plots.linked import (
     draw_bodies,
@@ -20,16 +19,15 @@ from dmoc.plots.linked import (
     joint_units,
     reaction_units,
 )
-from dmoc.plots.path import burning, draw_path, entries_once, is_wide
+from dmoc.plots.path import draw_path, is_wide
+from dmoc.plots.sheet import arrange, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,
     DARK,
     LIMIT,
     PATH,
-    PUSH,
     SETTINGS,
-    WARNING,
     flown_force,
     readable,
     speeds,
@@ -41,24 +39,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dmoc.checks.verification import Report
+    from dmoc.missions.solution import MissionSolution
 
 # A figure can be written in these formats, which the end of the file's name decides.
 SUFFIXES = (".png", ".pdf", ".svg")
-# Units in the headline have this sign for a square.
-SQUARED = "\u00b2"
 # A limit of more than this many times the largest force is told in the legend alone: its line would flatten the
 # curves.
 FAR = 6.0
 
 
 def save_figure(
-    solution: Solution, path: str | os.PathLike, report: Report | None = None, dpi: float = 150
+    solution: Solution | MissionSolution,
+    path: str | os.PathLike,
+    report: Report | None = None,
+    dpi: float = 150,
 ) -> None:
     """Draw a solution into a file, whole or not at all.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or MissionSolution
     path : path
         Ends in .png, .pdf or .svg, which decides the format.
     report : Report, optional
@@ -71,7 +71,8 @@ def save_figure(
     ValueError
         If the suffix is another one or the folder does not exist.
     """
-    of_kind("solution", solution, Solution)
+    if not hasattr(solution, "impulses"):
+        of_kind("solution", solution, Solution)
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     page = figure(solution, report)
@@ -79,50 +80,39 @@ def save_figure(
         page.savefig(temporary, dpi=dpi)
 
 
-def figure(solution: Solution, report: Report | None = None) -> Figure:
+def figure(solution: Any, report: Report | None = None) -> Figure:
     """A matplotlib Figure of a solution: path, force, speed, and energy or momentum.
 
     Zones, attractors and limits are drawn where the solution holds its problem.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or MissionSolution
     report : Report, optional
         Checks whose outcome is written below the panels.
     """
     import matplotlib
-    from matplotlib.figure import Figure
 
     with matplotlib.rc_context(SETTINGS):
-        page = Figure(figsize=(13.33, 7.5))
-        # The layout does not see the label of the z axis in space, so the columns are kept further apart.
-        page.set_layout_engine(
-            "constrained", w_pad=0.08, h_pad=0.06, wspace=0.1 if solution.dimension == 3 else 0.02
-        )
+        if hasattr(solution, "impulses"):
+            # What draws missions is loaded for them alone.
+            from dmoc.plots.mission import mission_page
+
+            return mission_page(solution, report)
+        page = new_page(solution.dimension)
         turns = bool(solution.path.attitudes)
         held = solution.reaction is not None
         wide = not held and is_wide(solution)
         drawn = _linked_panels(solution) if held else _turning_panels(solution) if turns else PANELS
-        path, panels = _panels(page, 3 if turns else solution.dimension, wide, len(drawn))
+        path, panels = new_panels(page, 3 if turns else solution.dimension, wide, len(drawn))
         left = draw_bodies if held else draw_path if solution.dimension else draw_sphere
         left(path, solution, **({"beside": True} if wide else {}))
-        size, unit = time_axis = readable(solution.end_times, "s")
+        size, unit = readable(solution.end_times, "s")
         for panel, draw in zip(panels, drawn, strict=True):
             draw(panel, solution, size)
-            _shade_burns(panel, solution, size)
-            where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.05)}
-            if wide:
-                where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.3), "ncol": 2}
-            panel.legend(*entries_once(panel), borderaxespad=0.0, **where)
-            panel.sharex(panels[0])
-            panel.tick_params(labelbottom=wide or panel is panels[-1])
-        for panel in panels if wide else panels[-1:]:
-            panel.set_xlabel(f"time [{unit}]")
-        if not wide:
-            page.align_ylabels(panels)
-        page.suptitle(_headline(solution, *time_axis), fontsize=16, color=DARK if solution.optimal else WARNING)
-        words, good = _footnote(solution, report)
-        page.supxlabel(words, fontsize=11, color=DARK if good else WARNING)
+            shade_burns(panel, solution, size)
+        arrange(page, panels, wide, unit)
+        entitle(page, solution, report, size, unit)
     return page
 
 
@@ -139,26 +129,6 @@ def _linked_panels(solution: Solution) -> list[Any]:
     joints: list[Any] = [partial(draw_joints, unit=unit) for unit in joint_units(solution)]
     exerted = [partial(draw_reactions, unit=unit) for unit in reaction_units(solution)]
     return [*controls, *(joints or [draw_speeds]), *exerted]
-
-
-def _panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[Any, list[Any]]:
-    """The path panel on the left, or above if it is wide, and those over time."""
-    if wide:
-        grid = page.add_gridspec(2, 3, height_ratios=(1.5, 1.0))
-        return page.add_subplot(grid[0, :]), [page.add_subplot(grid[1, column]) for column in range(3)]
-    grid = page.add_gridspec(count, 2, width_ratios=(1.15, 1.0))
-    path = page.add_subplot(grid[:, 0], projection="3d" if dimension == 3 else None)
-    return path, [page.add_subplot(grid[row, 1]) for row in range(count)]
-
-
-def _shade_burns(axes: Any, solution: Solution, late: float) -> None:
-    """Shade when an engine that also coasts is on."""
-    if (on := burning(solution)) is None:
-        return
-    times = solution.end_times if solution.hold else solution.time
-    on, step = (np.append(on, False), "post") if solution.hold else (on, None)
-    style = {"transform": axes.get_xaxis_transform(), "color": PUSH, "alpha": 0.18, "linewidth": 0, "zorder": 0}
-    axes.fill_between(times / late, 0, 1, where=on, step=step, **style).set_gid("engine on")
 
 
 def _draw_force(axes: Any, solution: Solution, late: float) -> None:
@@ -220,38 +190,6 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
         axes.set_ylim(bottom=0)
     axes.set_ylabel(f"{name} [{unit}]")
     axes.set_title(name.capitalize())
-
-
-def _headline(solution: Solution, late: float, late_unit: str) -> str:
-    """The objective, duration and final mass, with times in the unit of the time axis."""
-    about, problem = solution.provenance, solution.problem
-    name = "" if about.problem_name == "problem" else about.problem_name.replace("_", " ") + ": "
-    if not solution.optimal:
-        return f"{name}NOT SOLVED ({solution.status}), the last iterate"
-    kind = "objective" if problem is None else _wanted(problem.objective)
-    size, unit = (late, late_unit) if about.objective_unit == "s" else (1.0, about.objective_unit)
-    words = f"{name}{kind} {solution.objective / size:.6g} {unit.replace('^2', SQUARED)}"
-    if about.objective_unit != "s":
-        words += f", duration {solution.duration / late:.6g} {late_unit}"
-    told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
-    return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"
-
-
-def _wanted(objective: Objective) -> str:
-    """Such as `least effort` or `greatest final mass`."""
-    return f"{'least' if objective.sense > 0 else 'greatest'} {objective.label}"
-
-
-def _footnote(solution: Solution, report: Report | None) -> tuple[str, bool]:
-    """One line on numerics and checks, and whether all is well."""
-    spent = solution.build_s + solution.solve_s
-    mesh = f"order {solution.order}, {solution.steps} steps, {solution.iterations} iterations, {spent:.2g} s"
-    scene = "" if solution.problem else "; problem not attached: zones and limits are not shown"
-    if report is None:
-        return mesh + scene, True
-    failed = [check.name for check in report.checks if not check.ok]
-    words = f"checks failed: {', '.join(failed)}" if failed else f"all {len(report.checks)} checks hold"
-    return f"{mesh}; {words}{scene}", not failed
 
 
 # What is drawn over time of a point mass.

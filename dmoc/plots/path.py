@@ -19,6 +19,8 @@ MOST_DOTS = 40
 ARROWS = 20
 # The longest arrow of the force is this part of the extent [-].
 ARROW = 0.12
+# The name, unit and colour of the arrows along a path.
+FORCE = ("force", "N", PUSH)
 # Numbers with powers of ten between these two are written without one [-], as in all other panels.
 PLAIN = SETTINGS["axes.formatter.limits"]
 # In space they are so below this power of ten [-]: at the corner of the box numbers of five digits overlap.
@@ -33,19 +35,19 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
         _draw_line(axes, solution)
         return
     low, high = _view(solution)
-    size, unit = _scale(solution, low, high)
+    size, unit = scale_of(solution.position, low, high)
     path = within_steps(solution, solution.position)[1] / size
     tails, arrows, longest = _arrows(solution)
     view = low / size, high / size
     proxies = draw_scene(axes, solution, view, size)
-    _mark_burns(axes, solution, solution.position.T / size)
+    mark_burns(axes, solution, solution.position.T / size)
     # Beside the axes of a body, the path has a colour of its own.
     axes.plot(*path.T, color=DARK if solution.path.attitudes else PATH, label="path", zorder=3)
     if solution.steps <= MOST_DOTS:
         ends = solution.position[:: solution.order // 2] / size
         axes.plot(*ends.T, ".", color=PATH, label="step ends", zorder=3)
-    proxies += _draw_arrows(axes, tails / size, arrows / size, longest)
-    _mark_ends(axes, path[:1].T, path[-1:].T)
+    proxies += draw_arrows(axes, tails / size, arrows / size, longest)
+    mark_ends(axes, path[:1].T, path[-1:].T)
     if solution.path.attitudes:
         draw_triads(axes, solution, size)
     for label, swept in paths_of_points(solution).items():
@@ -57,16 +59,16 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
         axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label=shadow, zorder=0)
         # The order is given, since matplotlib would hide the path behind surfaces that it passes in front of.
         axes.computed_zorder = False
-    _frame(axes, view, unit)
-    _legend(axes, proxies, beside)
+    frame(axes, view, unit)
+    legend(axes, proxies, beside)
 
 
-def _scale(solution: Solution, low: np.ndarray, high: np.ndarray) -> tuple[float, str]:
+def scale_of(position: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[float, str]:
     """Size [m] and name of the unit of all axes, such as `10^5 km`, for a view between two corners [m].
 
     The power of ten belongs to the name: matplotlib would print one for each axis, and that of z on its label.
     """
-    size, unit = readable(np.ptp(solution.position, axis=0), "m")
+    size, unit = readable(np.ptp(position, axis=0), "m")
     power = int(np.floor(np.log10(max(np.abs([low, high]).max() / size, 1e-300))))
     if PLAIN[0] < power < (PLAIN_IN_SPACE if len(low) == 3 else PLAIN[1]):
         return size, unit
@@ -77,8 +79,13 @@ def is_wide(solution: Solution) -> bool:
     """Whether a path in the plane and its surroundings are much wider than high."""
     if solution.dimension != 2:
         return False
-    spans = np.subtract(*_view(solution)[::-1])
-    return solution.dimension == 2 and bool(spans[0] > WIDE * spans[1])
+    return lies_wide(_view(solution))
+
+
+def lies_wide(view: Corners) -> bool:
+    """Whether a view in the plane is much wider than high."""
+    spans = np.subtract(*view[::-1])
+    return len(spans) == 2 and bool(spans[0] > WIDE * spans[1])
 
 
 def _view(solution: Solution) -> Corners:
@@ -98,7 +105,7 @@ def burning(solution: Solution) -> np.ndarray | None:
     return on if switches and on.any() and not on.all() else None
 
 
-def _mark_burns(axes: Any, solution: Solution, curve: np.ndarray) -> None:
+def mark_burns(axes: Any, solution: Solution, curve: np.ndarray) -> None:
     """A broad line under the curve of the nodes where the engine is on."""
     if (on := burning(solution)) is None:
         return
@@ -118,15 +125,15 @@ def _draw_line(axes: Any, solution: Solution) -> None:
         elif isinstance(shape, Box):
             for edge in (edge for edge in (*shape.lower, *shape.upper) if np.isfinite(edge)):
                 axes.axhline(edge / size, color=FORBIDDEN, linestyle="--", label="keep-in zone")
-    _mark_burns(axes, solution, np.array([solution.time / late, solution.position[:, 0] / size]))
+    mark_burns(axes, solution, np.array([solution.time / late, solution.position[:, 0] / size]))
     axes.plot(times / late, path[:, 0] / size, color=PATH, label="position")
-    _mark_ends(axes, (times[:1] / late, path[:1, 0] / size), (times[-1:] / late, path[-1:, 0] / size))
+    mark_ends(axes, (times[:1] / late, path[:1, 0] / size), (times[-1:] / late, path[-1:, 0] / size))
     axes.set(xlabel=f"time [{unit_late}]", ylabel=f"x [{unit}]")
     axes.set_title("Position")
-    _legend(axes, [])
+    legend(axes, [])
 
 
-def _mark_ends(axes: Any, start: Any, goal: Any) -> None:
+def mark_ends(axes: Any, start: Any, goal: Any) -> None:
     style = {"linestyle": "none", "markerfacecolor": "white", "markeredgecolor": DARK, "zorder": 6}
     axes.plot(*start, marker="o", markersize=10, label="start", **style)
     axes.plot(*goal, marker="*", markersize=17, label="goal", **style)
@@ -134,6 +141,11 @@ def _mark_ends(axes: Any, start: Any, goal: Any) -> None:
 
 def _arrows(solution: Solution) -> tuple[np.ndarray, np.ndarray, float]:
     """Tails and arrows [m] of the force at a few places along the path, and the largest force there [N]."""
+    return scaled_arrows(*pushes(solution), extent_of(solution.position))
+
+
+def pushes(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Places [m] along the path and the force there [N], where there may be one."""
     places, force = solution.position, solution.force
     if solution.hold:
         ends = places[:: solution.order // 2]
@@ -141,16 +153,30 @@ def _arrows(solution: Solution) -> tuple[np.ndarray, np.ndarray, float]:
     if (on := burning(solution)) is not None:
         # All arrows stand in burns: a coast has none, and a short burn might have got none.
         places, force = places[on], force[on]
-    few = np.unique(np.linspace(0, len(force) - 1, ARROWS).round().astype(int))
+    return places, force
+
+
+def extent_of(position: np.ndarray) -> float:
+    """Diagonal of the box around some places [m]."""
+    return float(np.linalg.norm(np.ptp(position, axis=0)))
+
+
+def scaled_arrows(
+    places: np.ndarray, force: np.ndarray, extent: float, most: int = ARROWS
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Tails and arrows [m] of what acts at some of the places, and the largest of it."""
+    few = np.unique(np.linspace(0, len(force) - 1, min(most, len(force))).round().astype(int))
     places, force = places[few], force[few]
     strength = np.linalg.norm(force, axis=1)
     longest = float(strength.max(initial=0.0))
-    extent = float(np.linalg.norm(np.ptp(solution.position, axis=0)))
     seen = strength > 0.02 * longest
     return places[seen], force[seen] * (ARROW * extent / (longest or 1.0)), longest
 
 
-def _draw_arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: float) -> list[Any]:
+def draw_arrows(
+    axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: float, of: tuple[str, str, str] = FORCE
+) -> list[Any]:
+    """Arrows of what acts along a path, `of` its name, unit and colour; its entry in the legend."""
     from matplotlib.lines import Line2D
 
     if not len(tails):
@@ -166,13 +192,14 @@ def _draw_arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, longest: floa
         }
     else:
         style = {"arrow_length_ratio": 0.3, "linewidth": 1.5, "zorder": 4}
-    axes.quiver(*tails.T, *arrows.T, color=PUSH, **style).set_gid("force")
-    unit_size, unit = readable(longest, "N")
-    words = f"force, longest {longest / unit_size:.3g} {unit}"
-    return [Line2D([], [], color=PUSH, marker=">", markersize=7, label=words)]
+    name, base, colour = of
+    axes.quiver(*tails.T, *arrows.T, color=colour, **style).set_gid(name)
+    unit_size, unit = readable(longest, base)
+    words = f"{name}, longest {longest / unit_size:.3g} {unit}"
+    return [Line2D([], [], color=colour, marker=">", markersize=7, label=words)]
 
 
-def _frame(axes: Any, view: Corners, unit: str) -> None:
+def frame(axes: Any, view: Corners, unit: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     names = "xyz"[: len(view[0])]
@@ -206,7 +233,7 @@ def _frame(axes: Any, view: Corners, unit: str) -> None:
     axes.view_init(elev=25, azim=-60)
 
 
-def _legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
+def legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
     """Below the panel, or to its right."""
     handles, labels = entries_once(axes, proxies)
     if beside:

@@ -6,9 +6,9 @@ import xarray
 from sweep_helpers import FAILED, found, plan_of
 
 import dmoc
+from dmoc.charts.front import pareto
+from dmoc.charts.sweep import save_sweep, sweep_figure
 from dmoc.cli.app import main
-from dmoc.plots.front import pareto
-from dmoc.plots.sweep import save_sweep, sweep_figure
 from dmoc.scene.problem_file import Parameter
 from dmoc.sweeps.data import is_sweep, read_sweep, sweep_dataset, write_sweep
 from dmoc.sweeps.plan import Plan

@@ -11,8 +11,8 @@ import pytest
 
 from dmoc import PointGravity, Spring, State, TransferProblem, solve
 from dmoc.basics.memory import remembered
+from dmoc.charts.study import save_study
 from dmoc.cli.app import main
-from dmoc.plots.study import save_study
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, best_known, frontier, time_to_reach, work_precision
 from dmoc.studies.drift import drift, kepler

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dmoc.basics.files import whole_file
-from dmoc.plots.front import (
+from dmoc.charts.front import (
     FRONT,
     along,
     draw_front,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.plots.study import COLOURS, DASHES, MARKERS
+from dmoc.charts.study import COLOURS, DASHES, MARKERS
 from dmoc.plots.style import DARK, PALE, SETTINGS, WARNING, plain_numbers
 from dmoc.studies.drift import Drift
 from dmoc.studies.rounding import FORMS, Amplification, RoundOff

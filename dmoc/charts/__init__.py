@@ -1,0 +1,1 @@
+"""Pictures of sweeps, studies and stability."""
