@@ -12,7 +12,8 @@ from dmoc.motion.dynamics import Dynamics, state_symbols
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import velocity_along
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.layout import Group
+from dmoc.nlp.layout import LEG_MASS, LEG_START, Group
+from dmoc.nlp.program import Program
 from dmoc.nlp.solving import NLP
 from dmoc.scene.problem import TransferProblem
 
@@ -119,24 +120,36 @@ def _listed(values: np.ndarray) -> str:
 def worst_in_units(nlp: NLP, problem: TransferProblem, x, g) -> tuple[tuple[str, float, str], ...]:
     """The ten most violated rows and bounds, worst scaled violation first: name, violation, unit."""
     duration = nlp.unpack(x, problem).duration
-    found = []
-    for group, place, scaled in nlp.violations(problem, x, g, COUNT):
-        if scaled > SEEN:
-            index, component = divmod(place - group.start, len(group.labels))
-            value = scaled * group.scales[index, component]
-            if group in nlp.rows.groups:
-                value = scaled / group.scales[index, component]
-                size, unit = _row(nlp, problem, group, index, component, value, duration)
-            else:
-                size, unit = value, _unit_of_unknown(nlp, problem, group, component)
-            found.append((group.name_of(place), float(size), unit))
-    return tuple(found)
+    return tuple(
+        (group.name_of(place), *in_units(nlp, problem, group, place, scaled, duration))
+        for group, place, scaled in nlp.violations(problem, x, g, COUNT)
+        if scaled > SEEN
+    )
+
+
+def in_units(
+    nlp: Program, problem: TransferProblem, group: Group, place: int, scaled: float, duration: float
+) -> tuple[float, str]:
+    """Size and unit of the scaled violation of one row or bound, of a path that lasts `duration` [s]."""
+    index, component = divmod(place - group.start, len(group.labels))
+    if not any(group is one for one in nlp.rows.groups):
+        return float(scaled * group.scales[index, component]), _unit_of_unknown(nlp, problem, group, component)
+    value = scaled / group.scales[index, component]
+    size, unit = _row(nlp, problem, group, (index, component), value, duration)
+    return float(size), unit
 
 
 def _row(
-    nlp: NLP, problem: TransferProblem, group: Group, index: int, component: int, value: float, duration: float
+    nlp: Program,
+    problem: TransferProblem,
+    group: Group,
+    index: int,
+    component: int,
+    value: float,
+    duration: float,
 ) -> tuple[float, str]:
-    """Size and unit of a row's violation for a person, from its `value` in the unit that the NLP has for it."""
+    """Size and unit of a row's violation for a person, from its `value` in the unit of the NLP."""
+    index, component = place
     if group.owner is None and group.kind == "smooth":
         # A row of motion is a momentum per mass; over the node's share of the time it is a force.
         weight = duration * node_weights(nlp.mesh, nlp.scheme)[index]
@@ -148,11 +161,11 @@ def _row(
     return group.owner.of(problem).violation(value, unit)
 
 
-def _unit_of_unknown(nlp: NLP, problem: TransferProblem, group: Group, component: int) -> str:
+def _unit_of_unknown(nlp: Program, problem: TransferProblem, group: Group, component: int) -> str:
     blocks = nlp.dynamics.configuration.coordinates
     if group.name == "position":
         return str(blocks.sized("m", "-", "N m s^2")[component])
     if group.name.endswith(".velocity"):
         return str(blocks.paced("m/s", "rad/s", "N m s")[component])
-    units = {"mass": "kg", "duration": "s", "reaction": "m^2/s^2"}
+    units = {"mass": "kg", LEG_MASS: "kg", "duration": "s", LEG_START: "s", "reaction": "m^2/s^2"}
     return units.get(group.name) or problem.actuator.units(problem.dimension)[component]

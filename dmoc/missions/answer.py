@@ -10,22 +10,32 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.diagnosis.iterate import SEEN, in_units
 from dmoc.missions.path import MissionPath, kicks_of
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import Kick, MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
-from dmoc.nlp.ipopt import STATUSES
+from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution, reported
+from dmoc.results.solution import NOT_MET, Solution, reported
 from dmoc.scene.mission import Mission
+from dmoc.solver.rung import cut_short
 
 
 def answered(
     climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
 ) -> MissionSolution:
-    """The answer of an attempt as a MissionSolution."""
+    """The answer of an attempt as a MissionSolution; that of the last mesh solved if the time was over."""
+    if attempt.answer.status == "stopped" and climb.interrupt.late:
+        attempt = climb.held or attempt
+        found = _answered(climb, attempt, error, True, tol)
+        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
+    return _answered(climb, attempt, error, met, tol)
+
+
+def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:
     mission, program, answer = climb.mission, attempt.program, attempt.answer
     path, status = attempt.path, answer.status
     costs = _costs(program, answer.x)
@@ -39,9 +49,6 @@ def answered(
         message, success = "a local optimum", True
     else:
         message, success = STATUSES[status].advice, False
-    if status == "stopped" and climb.interrupt.late:
-        status = OUT_OF_TIME
-        message = STATUSES[OUT_OF_TIME].advice
     if success and not met:
         status, success = NOT_MET, False
         reached = "unknown" if error is None else f"{error.largest:.1e}"
@@ -63,13 +70,40 @@ def answered(
         status,
         message,
         tuple(climb.levels),
-        worst=() if success else tuple(program.worst(answer.x, answer.g)),
+        worst=() if success else worst_rows(program, answer, path),
         warnings=_warnings(mission, legs) if success else (),
         tolerance=tol,
         error=error,
         reason=f"{len(legs)} legs of {', '.join(str(leg.steps) for leg in legs)} steps",
         provenance=replace(about, options=climb.options),
     )
+
+
+def worst_rows(
+    program: MissionProgram, answer: Answer, path: MissionPath
+) -> tuple[tuple[str, float, str], ...]:
+    """The most violated rows and bounds, worst scaled violation first: name with leg or joint, size, unit."""
+    found = []
+    for scaled, place, column in program.worst(answer.x, answer.g):
+        if scaled <= SEEN:
+            break
+        found.append((program.name_of(place, column), *_size_of(program, path, scaled, place, column)))
+    return tuple(found)
+
+
+def _size_of(
+    program: MissionProgram, path: MissionPath, scaled: float, place: int, column: bool
+) -> tuple[float, str]:
+    for i, (placed, leg) in enumerate(zip(program.legs, path.legs, strict=True)):
+        layout = placed.program.columns if column else placed.program.rows
+        at = place - (placed.columns if column else placed.rows)
+        if 0 <= at < layout.size:
+            problem = program.mission.fixed_at(i, path.begins[i], float(leg.mass[0]), leg.duration)
+            return in_units(placed.program, problem, layout.group_at(at), at, scaled, leg.duration)
+    # The unknowns of joints have no bounds: this is a row.
+    group = program.rows.group_at(place - program.first_row)
+    component = place - program.first_row - group.start
+    return scaled / float(group.scales[0, component]), group.units[component] or "-"
 
 
 def _costs(program: MissionProgram, x: np.ndarray) -> np.ndarray:

@@ -69,6 +69,8 @@ class Climb:
         self.compiled = compiled
         self.interrupt = Interrupt(time_limit)
         self.levels: list[Level] = []
+        # The last attempt that solved the mission itself, not one whose |F| is rounded more widely.
+        self.held: Attempt | None = None
 
     def attempt(
         self, path: MissionPath, rounding: float | None = None, most: int | None = None, carried: bool = False
@@ -95,7 +97,9 @@ class Climb:
             evaluations=answer.evaluations,
         )
         self.levels.append(level)
-        return Attempt(program, answer, level)
+        made = Attempt(program, answer, level)
+        self.held = made if made.solved and rounding is None else self.held
+        return made
 
     def _watch(self, program: MissionProgram) -> Watch:
         def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
@@ -103,7 +107,7 @@ class Climb:
             orders = max(leg.program.scheme.order for leg in program.legs)
             steps = sum(len(leg.program.mesh) - 1 for leg in program.legs)
             worst = program.worst(x.ravel(), g.ravel(), 1)
-            name, size = (worst[0][0], worst[0][1]) if worst else ("", 0.0)
+            name, size = (program.name_of(*worst[0][1:]), worst[0][0]) if worst else ("", 0.0)
             return bool(self.progress(orders, steps, iteration, cost, name, size))
 
         return Watch(*program.sizes, tell if self.progress else None, self.interrupt)
@@ -169,7 +173,7 @@ class Climb:
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.attempt(onto, carried=True)
-            if not found.solved:
+            if not found.solved and found.answer.status != "stopped":
                 found = self.attempt(_cold(onto), carried=True)
             if found.answer.status == "stopped":
                 return found, error, False

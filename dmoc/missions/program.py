@@ -275,15 +275,14 @@ class MissionProgram:
             return f"{found[0]}: {found[1].name_of(place - found[2])}"
         return self.rows.name_of(place - self.first_row)
 
-    def worst(self, x: np.ndarray, g: np.ndarray, count: int = 10) -> list[tuple[str, float, str]]:
-        """The most violated rows and bounds, worst first: name, scaled size, unit."""
+    def worst(self, x: np.ndarray, g: np.ndarray, count: int = 10) -> list[tuple[float, int, bool]]:
+        """The most violated rows and bounds, worst first: scaled size, place, and whether it is an unknown."""
         lbx, ubx, lbg, ubg = self.bounds()
         found = []
         for values, low, high, column in ((x, lbx, ubx, True), (g, lbg, ubg, False)):
             excess = np.nan_to_num(np.maximum(low - values, values - high), nan=np.inf)
             found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
-        found.sort(reverse=True)
-        return [(self.name_of(place, column), size, "scaled") for size, place, column in found[:count]]
+        return sorted(found, reverse=True)[:count]
 
 
 def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:

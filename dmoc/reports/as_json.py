@@ -45,6 +45,39 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             }
             for check in listed
         },
+        **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
+    }
+
+
+def _of_mission(solution: Any) -> dict[str, Any]:
+    """The legs, the impulses and the length of the primer vector over time."""
+    axes = solution.dimension
+    times, sizes = solution.primer if solution.impulses and solution.path.warm else ([], [])
+    return {
+        "legs": [
+            {
+                "name": leg.provenance.problem_name,
+                "start_time": float(leg.provenance.start_time),
+                "duration": float(leg.duration),
+                "order": int(leg.order),
+                "steps": int(leg.steps),
+                "cost": float(leg.objective),
+                "start_mass": float(leg.path.mass[0]),
+                "final_mass": float(leg.final_mass),
+            }
+            for leg in solution.legs
+        ],
+        "impulses": [
+            {
+                "at": kick.joint,
+                "time": float(kick.time),
+                "position": [float(x) for x in kick.position],
+                "velocity_change": [float(x) for x in kick.change[:axes]],
+                "size": float(kick.size),
+            }
+            for kick in solution.impulses
+        ],
+        "primer": {"time": [float(t) for t in times], "length": [float(size) for size in sizes]},
     }
 
 

@@ -117,7 +117,7 @@ def test_impulses_stand_on_the_path_and_at_a_primer_of_one():
     solution = solved(hohmann)
     arrows = next(one for one in path.collections if one.get_gid() == "impulse")
     kicks = np.array([kick.change for kick in solution.impulses])
-    assert arrows.XY == pytest.approx(np.array([kick.position for kick in solution.impulses]))
+    assert pytest.approx(np.array([kick.position for kick in solution.impulses])) == arrows.XY
     both = np.array([arrows.U, arrows.V]).T
     assert both / kicks == pytest.approx(np.full((2, 2), both[0, 0] / kicks[0, 0]))
     assert "impulse, longest 0.155 m/s" in legend(path)
