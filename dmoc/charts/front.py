@@ -70,10 +70,12 @@ def pareto(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def front_axes(data: Dataset) -> tuple[str, str] | None:
     """The names of the results for time and for expense, or None where all points take the same time."""
     known = result(data, "checks_hold").values
-    durations, burned = (result(data, name).values[known] for name in ("duration", "propellant"))
+    names = "duration", "propellant", "effort"
+    durations, burned, effort = (result(data, name).values[known] for name in names)
     if durations.size < 3 or np.ptp(durations) < 1e-6 * durations.max():
         return None
-    return "duration", "propellant" if burned.max() > 0 else "effort"
+    # Impulses that burn nothing are no effort either.
+    return "duration", "propellant" if burned.max() > 0 else "effort" if effort.max() > 0 else "impulse"
 
 
 def is_front_itself(data: Dataset, names: tuple[str, str]) -> bool:

@@ -140,13 +140,7 @@ def in_units(
 
 
 def _row(
-    nlp: Program,
-    problem: TransferProblem,
-    group: Group,
-    index: int,
-    component: int,
-    value: float,
-    duration: float,
+    nlp: Program, problem: TransferProblem, group: Group, place: tuple[int, int], value: float, duration: float
 ) -> tuple[float, str]:
     """Size and unit of a row's violation for a person, from its `value` in the unit of the NLP."""
     index, component = place

@@ -74,6 +74,11 @@ class Event(ABC):
         """The mass after it [kg], for a guess."""
         return mass
 
+    @property
+    def dropped(self) -> float:
+        """Mass that is left behind unburnt [kg]."""
+        return 0.0
+
     @abstractmethod
     def words(self) -> str:
         """One line for a person."""
@@ -147,6 +152,10 @@ class Drop(Event):
 
     def burnt(self, mass: float, kick: float = 0.0) -> float:
         return mass - self.mass
+
+    @property
+    def dropped(self) -> float:
+        return self.mass
 
     def words(self) -> str:
         return f"{self.mass:g} kg are left behind"

@@ -131,6 +131,11 @@ class Mission:
         return both_ends(self.start_time)
 
     @property
+    def dropped(self) -> float:
+        """Mass that is left behind unburnt on the way [kg]."""
+        return sum(part.dropped for part in self.legs if isinstance(part, Event))
+
+    @property
     def plan(self) -> tuple[Leg, ...]:
         """The legs alone."""
         return tuple(part for part in self.legs if isinstance(part, Leg))

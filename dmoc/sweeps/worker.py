@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 import threading
 import time
 from contextlib import redirect_stderr, redirect_stdout
@@ -20,12 +21,11 @@ from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
-    from dmoc.motion.path import DiscretePath
-    from dmoc.results.solution import Solution
-    from dmoc.scene.problem import TransferProblem
 
 # In a packed path the names of multipliers begin with this, so that they cannot be taken for those of a field.
 MULTIPLIER = "multiplier "
+# What belongs to the joints of a mission's path.
+JOINTS = ("own", "forces")
 # A process solves one point at a time, also where a scheduler runs several threads in it: the output of a
 # point is redirected, which is done for the whole process.
 _TURN = threading.Lock()
@@ -82,10 +82,13 @@ def failed_record(status: str, message: Any) -> dict[str, Any]:
     return {"status": status, "message": unbroken(message)}
 
 
-def pack(path: DiscretePath) -> str:
-    """A path as text, exact to the last bit."""
+def pack(path: Any) -> str:
+    """A path, or that of a mission, as text, exact to the last bit."""
     import numpy as np
 
+    if hasattr(path, "legs"):
+        joints = {name: {key: known.tolist() for key, known in getattr(path, name).items()} for name in JOINTS}
+        return json.dumps({"legs": [pack(leg) for leg in path.legs], "begins": path.begins, **joints})
     arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
     arrays |= {name: getattr(path, name) for name in ("start_velocity", "goal_velocity")}
     arrays |= {MULTIPLIER + str(key): values for key, values in path.multipliers.items()}
@@ -96,14 +99,20 @@ def pack(path: DiscretePath) -> str:
     return base64.b64encode(buffer.getvalue()).decode()
 
 
-def unpack(text: str) -> DiscretePath:
+def unpack(text: str) -> Any:
     """The path that `pack` wrote."""
     import numpy as np
 
     from dmoc.motion.path import DiscretePath, Key
 
-    with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as held:
-        arrays = dict(held)
+    if text.startswith("{"):
+        from dmoc.missions.path import MissionPath
+
+        held = json.loads(text)
+        joints = [{key: np.array(known) for key, known in held[name].items()} for name in JOINTS]
+        return MissionPath(tuple(map(unpack, held["legs"])), tuple(held["begins"]), *joints)
+    with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as stored:
+        arrays = dict(stored)
     multipliers = {
         Key.parse(name.removeprefix(MULTIPLIER)): arrays.pop(name)
         for name in list(arrays)
@@ -121,9 +130,9 @@ def _problem_file(path: str, source_hash: str) -> ProblemFile:
     return file
 
 
-def _solve(problem: TransferProblem, task: Task) -> tuple[Solution, bool]:
+def _solve(problem: Any, task: Task) -> tuple[Any, bool]:
     """From the neighbour if there is one, else, or if that fails, from the problem's own guess."""
-    from dmoc.solver.solve import solve
+    from dmoc.missions.front import solve
 
     if task.start is not None:
         solution = solve(problem, guess=unpack(task.start), **task.numerics)
@@ -132,9 +141,9 @@ def _solve(problem: TransferProblem, task: Task) -> tuple[Solution, bool]:
     return solve(problem, **task.numerics), False
 
 
-def _record_of(solution: Solution, warm: bool) -> dict[str, Any]:
+def _record_of(solution: Any, warm: bool) -> dict[str, Any]:
     """What is kept of a solution; figures of a failed one mean nothing and are left out."""
-    from dmoc.checks.verification import verify
+    from dmoc.missions.front import verify
 
     problem = solution.require_problem()
     record: dict[str, Any] = {
@@ -159,27 +168,34 @@ def _record_of(solution: Solution, warm: bool) -> dict[str, Any]:
         "objective_sense": problem.objective.sense,
         "duration": solution.duration,
         "final_mass": solution.final_mass,
-        "propellant": problem.mass - solution.final_mass,
+        "propellant": problem.mass - getattr(problem, "dropped", 0.0) - solution.final_mass,
         **_efforts(solution),
         **_worst(verdict),
         "verify_s": time.perf_counter() - begun,
     }
 
 
-def _efforts(solution: Solution) -> dict[str, float]:
-    """Effort [N^2 s] and impulse [N s] of the force, with the scheme's own weights."""
+def _efforts(solution: Any) -> dict[str, float]:
+    """Effort [N^2 s] and impulse [N s] of the force, by the scheme's own weights; kicks count as impulses."""
     import numpy as np
 
     from dmoc.motion.lobatto import scheme
     from dmoc.motion.mesh import node_weights
 
-    path = solution.path
-    weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
-    size = np.linalg.norm(solution.force, axis=1)
-    return {
-        "effort": float(0.5 * path.duration * weights @ size**2),
-        "impulse": float(path.duration * weights @ size),
-    }
+    effort = impulse = 0.0
+    for leg in getattr(solution, "legs", (solution,)):
+        path = leg.path
+        weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
+        size = np.linalg.norm(leg.force, axis=1)
+        effort += float(0.5 * path.duration * weights @ size**2)
+        impulse += float(path.duration * weights @ size)
+    for kick in getattr(solution, "impulses", ()):
+        # The mass before it: of the leg that ends there or, at the start, of the whole.
+        before = [leg.final_mass for leg in solution.legs if leg.time[-1] <= kick.time] or [
+            solution.problem.mass
+        ]
+        impulse += before[-1] * kick.size
+    return {"effort": effort, "impulse": impulse}
 
 
 def _worst(verdict: Report) -> dict[str, Any]:
