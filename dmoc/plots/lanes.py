@@ -33,6 +33,8 @@ LEG_LINES = ("-", (0, (5, 2)), (0, (1, 1)))
 MOST_NAMED = 6
 # Speeds are drawn from zero where they fall below this part of the largest [-].
 NEAR_REST = 0.5
+# The mass is drawn if it changes by more than this part of it [-]: by less it is kept to rounding.
+CHANGED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def lanes_of(solution: MissionSolution) -> list[Any]:
     lanes += [_draw_primer] * (bool(solution.impulses) and solution.path.warm)
     lanes += [_draw_speed] * (solution.dimension > 0)
     lanes += [_draw_turning] * turned
-    return lanes + [_draw_mass] * bool(np.ptp(heavy) > 0)
+    return lanes + [_draw_mass] * bool(np.ptp(heavy) > CHANGED * heavy.max())
 
 
 def looks_of(legs: Sequence[Solution]) -> list[_Look]:

@@ -88,7 +88,8 @@ def pack(path: Any) -> str:
 
     if hasattr(path, "legs"):
         joints = {name: {key: known.tolist() for key, known in getattr(path, name).items()} for name in JOINTS}
-        return json.dumps({"legs": [pack(leg) for leg in path.legs], "begins": path.begins, **joints})
+        facts = {"begins": path.begins, "idle": path.idle}
+        return json.dumps({"legs": [pack(leg) for leg in path.legs], **facts, **joints})
     arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
     arrays |= {name: getattr(path, name) for name in ("start_velocity", "goal_velocity")}
     arrays |= {MULTIPLIER + str(key): values for key, values in path.multipliers.items()}
@@ -109,8 +110,9 @@ def unpack(text: str) -> Any:
         from dmoc.missions.path import MissionPath
 
         held = json.loads(text)
-        joints = [{key: np.array(known) for key, known in held[name].items()} for name in JOINTS]
-        return MissionPath(tuple(map(unpack, held["legs"])), tuple(held["begins"]), *joints)
+        own, forces = ({key: np.array(known) for key, known in held[name].items()} for name in JOINTS)
+        idle = tuple(held.get("idle", ()))
+        return MissionPath(tuple(map(unpack, held["legs"])), tuple(held["begins"]), own, forces, idle=idle)
     with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as stored:
         arrays = dict(stored)
     multipliers = {

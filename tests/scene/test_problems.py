@@ -9,8 +9,7 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import root
 
-from dmoc import solve
-from dmoc.checks.verification import verify
+from dmoc import solve, verify
 from dmoc.scene.problem_file import catalogue, load_problem
 
 ROOT = Path(__file__).parents[2]
