@@ -1,7 +1,7 @@
 """Find the halo orbit around the near libration point of the Moon that closes.
 
-The circular restricted three-body problem in its turning frame, as in `halo_transfer`. The orbit begins at
-right angles to the plane of symmetry at a height that is given; its velocity and its period are found. The
+The circular restricted three-body problem in its turning frame, as in `halo_transfer`. The orbit begins in the
+plane of symmetry at a height that is given; its place there, its velocity and its period are found. The
 guess is an ellipse of the right size.
 """
 
@@ -31,7 +31,7 @@ def problem(height: float = 0.05, mass_ratio: float = 0.01215058560962404):
 
     return Mission(
         mass=1.0,
-        start=State((None, 0.0, height), (0.0, None, 0.0)),
+        start=State((None, 0.0, height), None),
         goal=Periodic(),
         effects=three_body(mass_ratio),
         legs=[Coast((2.2, 3.2), order=8, steps=20)],

@@ -100,6 +100,14 @@ TABLE = (
         "fast_turn", "least time", 3.243083277, "Bilimoria & Wie 1993: 3.243; switching times", (4, 100), 1e-4
     ),
     Reference("twelve_thrusters", "impulse", 5.7500, "other discretisations (5)", (4, 100), 3e-4),
+    Reference("hohmann", "velocity change", 0.2844570503761732, "closed form (Hohmann 1925)", (8, 16), 1e-9),
+    Reference(
+        "bielliptic", "velocity change", 0.520739091446076, "closed form (Sternfeld 1934)", (8, 30), 1e-7
+    ),
+    Reference(
+        "cw_impulses", "velocity change", 0.7645999702135722, "dual of the convex problem", (8, 12), 5e-8
+    ),
+    Reference("delta_iii", "mass", 7529.712, "Betts 2010", (6, 12), 1e-7),
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )
 NOTES = """

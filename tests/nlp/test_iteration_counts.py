@@ -52,7 +52,7 @@ MISSIONS = {
     "cw_impulses": 23,
     "delta_iii": 42,
     "gates": 7,
-    "halo_orbit": 35,
+    "halo_orbit": 6,
     "hohmann": 14,
     "planet_to_planet": 10,
 }
