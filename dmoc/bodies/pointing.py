@@ -14,7 +14,7 @@ from dmoc.basics.digits import down, up
 from dmoc.basics.quaternions import rotated
 from dmoc.effects.base import Body
 from dmoc.effects.user_functions import as_column, tried
-from dmoc.parts.constraint import Constraint
+from dmoc.parts.constraint import Constraint, checked_on
 from dmoc.parts.rows import Row
 
 
@@ -35,12 +35,16 @@ class _Cone(_OfAttitude):
     axis: Vector
     direction: Vector | Callable
     angle: float
+    on: str = ""
     unit: ClassVar[str] = "degrees"
     keeps_out: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checked(
-            self, axis=_unit("axis", self.axis), angle=number("angle", self.angle, "degrees", positive=True)
+            self,
+            axis=_unit("axis", self.axis),
+            angle=number("angle", self.angle, "degrees", positive=True),
+            on=checked_on(self),
         )
         if self.angle >= 180:
             raise ValueError(f"{type(self).__name__}: angle must be less than 180 degrees; got {self.angle:g}")
@@ -124,6 +128,8 @@ class PointingKeepOut(_Cone):
         Direction in space axes [-]; made a unit vector. A function takes a CasADi time [s].
     angle : float
         Half angle of the cone [degrees], more than 0 and less than 180.
+    on : str
+        The name of the body, where there are several.
     """
 
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
@@ -137,7 +143,7 @@ class PointingKeepOut(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine < 1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-out {index} of at most {down(eased.angle)} degrees (you gave {self.angle:g})"
+        return f"pointing keep-out {index}{self.of_body} of at most {down(eased.angle)} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()
@@ -156,6 +162,8 @@ class PointingKeepIn(_Cone):
         Direction in space axes [-]; made a unit vector. A function takes a CasADi time [s].
     angle : float
         Half angle of the cone [degrees], more than 0 and less than 180.
+    on : str
+        The name of the body, where there are several.
     """
 
     keeps_out: ClassVar[bool] = False
@@ -171,7 +179,7 @@ class PointingKeepIn(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine > -1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-in {index} of at least {up(eased.angle)} degrees (you gave {self.angle:g})"
+        return f"pointing keep-in {index}{self.of_body} of at least {up(eased.angle)} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()
@@ -186,14 +194,18 @@ class RateLimit(_OfAttitude):
     ----------
     limit : float
         Largest angular rate [rad/s].
+    on : str
+        The name of the body, where there are several.
     """
 
     limit: float
+    on: str = ""
     unit: ClassVar[str] = "rad/s"
     adjustable: ClassVar[tuple[str, ...]] = ("limit",)
 
     def __post_init__(self) -> None:
-        checked(self, limit=number("limit", self.limit, "rad/s", positive=True))
+        limit = number("limit", self.limit, "rad/s", positive=True)
+        checked(self, limit=limit, on=checked_on(self))
 
     @property
     def limits_speed(self) -> bool:
@@ -223,7 +235,8 @@ class RateLimit(_OfAttitude):
         return self.times(float(np.sqrt(1 + slack)))
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
-        return f"a rate limit of {up(eased.largest_speed() or 0.0)} rad/s (you gave {self.limit:g} rad/s)"
+        enough = up(eased.largest_speed() or 0.0)
+        return f"a rate limit{self.of_body} of {enough} rad/s (you gave {self.limit:g} rad/s)"
 
 
 def _unit(name: str, value: Any) -> tuple[float, ...]:

@@ -124,6 +124,11 @@ class Coordinates:
             np.repeat(mine, [block.freedom for block in self.blocks]),
         )
 
+    def quaternion_of(self, name: str) -> slice:
+        """Where the unit quaternion of a body of a system stands; an only body has an empty name."""
+        pairs = zip(self.blocks, self._slices(), strict=True)
+        return next(at for block, at in pairs if block.kind == ATTITUDE and block.body == name)
+
     @property
     def turns(self) -> bool:
         """Whether there is an attitude among them."""

@@ -90,7 +90,8 @@ class Relaxable(Limits):
         times = self.problem.start_time + path.duration * np.interp(
             np.linspace(0, 1, len(q)), np.linspace(0, 1, len(path.fractions)), path.fractions
         )
-        seen = zone.seen(q, np.zeros_like(q))
+        made = path.coordinates
+        seen = zone.seen_of(made, q, np.zeros((len(q), made.motions.size)))
         for more in np.linspace(0.0, MOST_CLEARED, 101):
             eased = limit.change(self.problem, slack + more).constraints[entry]
             if eased is zone:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
+from dmoc.parts.constraint import Constraint
 from dmoc.scene.problem import TransferProblem
 
 # A path that was bent past one zone is bent at most this many times a zone to clear the others: two zones that
@@ -20,7 +22,18 @@ def ways_past(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
     """Names and paths, each bent past one zone on one of its sides."""
     for i, constraint in enumerate(problem.constraints):
         for way, bend in constraint.ways_round(base.place_of(constraint), base.fractions):
-            yield f"{way} of {type(constraint).__name__} {i + 1}", base.moved(bend)
+            yield f"{way} of {constraint.named(i)}", bent(problem, base, constraint, bend)
+
+
+def bent(problem: TransferProblem, path: DiscretePath, zone: Constraint, bend: np.ndarray) -> DiscretePath:
+    """A path with the body that a zone limits moved by a bend [m], and what links hold to it moved along."""
+    moved = path.moved(bend, zone.on)
+    if not problem.links:
+        return moved
+    # What keeps to links is loaded for problems with links alone.
+    from dmoc.links.along import kept_on_links
+
+    return replace(path, position=kept_on_links(problem, moved.position, zone.on))
 
 
 def clear_ways(problem: TransferProblem, base: DiscretePath) -> list[DiscretePath]:
@@ -31,9 +44,9 @@ def clear_ways(problem: TransferProblem, base: DiscretePath) -> list[DiscretePat
     """
     found: list[tuple[bool, float, DiscretePath]] = []
     extent = base.diagonal or 1.0
-    for _, bent in ways_past(problem, base):
+    for _, first in ways_past(problem, base):
         for nearer in (False, True):
-            path, clear = _past_the_others(problem, base, bent, nearer)
+            path, clear = _past_the_others(problem, base, first, nearer)
             if all(np.abs(path.place - old.place).max() > SAME_WAY * extent for _, _, old in found):
                 length = float(np.linalg.norm(np.diff(path.place, axis=0), axis=1).sum())
                 found.append((not clear, length, path))
@@ -41,20 +54,22 @@ def clear_ways(problem: TransferProblem, base: DiscretePath) -> list[DiscretePat
 
 
 def _past_the_others(
-    problem: TransferProblem, base: DiscretePath, bent: DiscretePath, nearer: bool
+    problem: TransferProblem, base: DiscretePath, first: DiscretePath, nearer: bool
 ) -> tuple[DiscretePath, bool]:
     """A bent path, bent again past the zones that it cuts, the deepest first; and whether it clears all."""
-    path, still = bent, np.zeros_like(bent.place)
+    path = first
     times = problem.start_time + base.duration * base.fractions
     zones = [zone for zone in problem.constraints if not zone.turns_body]
     for _ in range(BENDS_A_ZONE * len(zones)):
-        deep = [float(zone.excess_at(times, path.place_of(zone), still).max()) for zone in zones]
+        places = [path.place_of(zone) for zone in zones]
+        excess = zip(zones, places, strict=True)
+        deep = [float(zone.excess_at(times, place, np.zeros_like(place)).max()) for zone, place in excess]
         deepest = zones[int(np.argmax(deep))]
         bends = deepest.ways_round(path.place_of(deepest), path.fractions)
         ways = [bend for _, bend in bends]
         if max(deep) <= 0 or not ways:
             return path, max(deep) <= 0
-        aside = path.place - base.place
+        aside = path.place_of(deepest) - base.place_of(deepest)
         worth = [-float(np.abs(bend).max()) if nearer else float((bend * aside).sum()) for bend in ways]
-        path = path.moved(ways[int(np.argmax(worth))])
+        path = bent(problem, path, deepest, ways[int(np.argmax(worth))])
     return path, False

@@ -14,6 +14,7 @@ from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.open_ends import end_estimates, spiral_between
+from dmoc.guess.past_zones import bent
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -81,13 +82,15 @@ def starting_guess(
         node = int(np.argmax(wrong))
         kind = "larger than any motion" if np.isfinite(position[node]).all() else "not finite"
         raise ValueError(f"guess is {kind} at node {node}: position {position[node]} m")
-    for constraint in problem.constraints:
-        position = constraint.off_centre(position, fractions)
     for end, place in ((problem.start, 0), (problem.goal, -1)):
         known = ~np.isnan(end.fixed()[0])
         position[place, known] = end.fixed()[0][known]
     mass = np.full(len(fractions), problem.mass)
     guess = replace(DiscretePath(mesh, order, hold, duration, position, control, mass, *ends), made_of=made_of)
+    for zone in problem.constraints:
+        seen = guess.place_of(zone)
+        if (bend := zone.off_centre(seen, fractions) - seen).any():
+            guess = bent(problem, guess, zone, bend)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.basics.quaternions import AXES, slerp
 from dmoc.configurations.base import Configuration
-from dmoc.configurations.coordinates import ATTITUDE
+from dmoc.configurations.coordinates import ATTITUDE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.base import Body
 
@@ -57,7 +57,7 @@ def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.nd
     straight = start + fractions[:, None] * (aim - start)
     for turning in body.coordinates.quaternions:
         straight[:, turning] = slerp(start[turning], aim[turning], fractions)
-    at, knows, waiting = states_of(body, straight), False, list(problem.links)
+    at, knows, waiting = states_of(body.coordinates, straight), False, list(problem.links)
     while waiting:
         # What sits on a body that another link carries waits for that one; of a ring the first begins.
         carried = {name for link in waiting for name in link.holds[-1:]}
@@ -71,6 +71,19 @@ def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.nd
     if not knows and np.abs(on.gaps(straight)).max() > BENT * float(np.linalg.norm(aim - start)):
         path = _step_by_step(on, start, aim, fractions)
     return np.array([on.put(place) for place in path])
+
+
+def kept_on_links(problem: Any, path: np.ndarray, held: str) -> np.ndarray:
+    """A path whose nodes are put on the links of a problem; the place of one body stays where links let it."""
+    on = _OnLinks(configuration_of(problem))
+    made = on.body.coordinates
+    kept, found = made.places & made.of_body(held)[0], path.copy()
+    for i, place in enumerate(path):
+        found[i] = on.put(place, kept)
+        if np.abs(on.gaps(found[i][None])).max() > BENT * float(np.linalg.norm(place)):
+            # It is out of reach: all bodies give way.
+            found[i] = on.put(place)
+    return found
 
 
 def _step_by_step(on: _OnLinks, start: np.ndarray, aim: np.ndarray, fractions: np.ndarray) -> np.ndarray:
@@ -92,10 +105,10 @@ def _step_by_step(on: _OnLinks, start: np.ndarray, aim: np.ndarray, fractions: n
     return np.stack([np.interp(fractions * way[-1], way, column) for column in path.T], axis=1)
 
 
-def states_of(body: Configuration, path: np.ndarray) -> dict[str, Body]:
+def states_of(made: Coordinates, path: np.ndarray) -> dict[str, Body]:
     """Each body by its name, at rest, from coordinates of shape (count, size)."""
     found: dict[str, dict[str, np.ndarray]] = {}
-    for block, part in zip(body.coordinates.blocks, body.coordinates.cut(path), strict=True):
+    for block, part in zip(made.blocks, made.cut(path), strict=True):
         kind = "attitude" if block.kind == ATTITUDE else "position"
         found.setdefault(block.body, {})[kind] = part
     still = np.zeros((len(path), AXES))
@@ -117,6 +130,7 @@ class _OnLinks:
     """Links as functions of the place."""
 
     def __init__(self, body: Configuration):
+        self.body = body
         q = ca.SX.sym("q", body.size)
         # Attitudes stay unit quaternions on the way.
         g = body.g(q) if body.surplus else body.links_at(q)

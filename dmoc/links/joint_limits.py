@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
 from dmoc.basics.digits import down, up
-from dmoc.configurations.base import Configuration
 from dmoc.effects.base import Body
 from dmoc.links.along import states_of
 from dmoc.links.joint import Joint, room
@@ -33,8 +32,6 @@ class JointLimit(Constraint):
     joint: Any
     low: float | None = None
     high: float | None = None
-    # The coordinates of all bodies, which a problem fills in.
-    body: Configuration | None = field(default=None, repr=False, compare=False)
     turns_body: ClassVar[bool] = True
     moves_body: ClassVar[bool] = False
 
@@ -60,6 +57,10 @@ class JointLimit(Constraint):
         return True
 
     @property
+    def bodies(self) -> tuple[str, ...]:
+        return self.joint.holds
+
+    @property
     def stops(self) -> tuple[float, ...]:
         return tuple(side for side in (self.low, self.high) if side is not None)
 
@@ -72,9 +73,8 @@ class JointLimit(Constraint):
         high = np.inf if self.high is None else self.high
         return [Row(self.joint.name, self.joint.coordinate(at), low, high, self.unit)]
 
-    def seen(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        assert self.body is not None
-        at = states_of(self.body, q)
+    def seen_of(self, made: Any, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        at = states_of(made, q)
         base = at[self.joint.to] if self.joint.to else room(len(q))
         return self.joint.measured(base, at[self.joint.on]), v
 

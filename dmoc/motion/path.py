@@ -93,14 +93,15 @@ class DiscretePath:
 
     def place_of(self, constraint: Any) -> np.ndarray:
         """The place that a constraint limits [m], shape (nodes, axes): the centre of mass or a point."""
-        if constraint.point is None:
+        if constraint.point is None and not constraint.on:
             return self.place
-        return constraint.seen(self.position, np.zeros((len(self.position), self.coordinates.motions.size)))[0]
+        made, still = self.coordinates, np.zeros((len(self.position), self.coordinates.motions.size))
+        return constraint.seen_of(made, self.position, still)[0]
 
-    def moved(self, bend: np.ndarray) -> DiscretePath:
-        """The path with its places moved by a bend, shape (nodes, axes) [m]."""
-        position = self.position.copy()
-        position[:, self.coordinates.places] += bend
+    def moved(self, bend: np.ndarray, on: str = "") -> DiscretePath:
+        """The path with the place of a body moved by a bend, shape (nodes, axes) [m]."""
+        position, made = self.position.copy(), self.coordinates
+        position[:, made.places & made.of_body(on)[0]] += bend
         return replace(self, position=position)
 
     @property

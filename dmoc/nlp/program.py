@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.configurations.coordinates import Coordinates
+from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
 from dmoc.motion.dynamics import Dynamics
@@ -80,15 +80,8 @@ class Program:
             lower[group.start : group.stop] = np.broadcast_to(low, (group.count, len(group.labels))).ravel()
             upper[group.start : group.stop] = np.broadcast_to(high, (group.count, len(group.labels))).ravel()
 
-        n, origin, places = problem.dimension, self.units.origin, self.dynamics.configuration.coordinates.places
-        boxes = [constraint.bounds(n) for constraint in problem.constraints]
-        sides = []
-        for found, free in zip(_intersection(boxes, n), (-np.inf, np.inf), strict=True):
-            sides.append(np.full((*found.shape[:-1], len(places)), free))
-            # Boxes limit a single body; of several all are free.
-            bodies = max(1, int(places.sum()) // n)
-            sides[-1][..., places] = np.tile(found, bodies)[..., : places.sum()]
-        put("position", *(side - origin for side in sides))
+        n, origin = problem.dimension, self.units.origin
+        put("position", *(side - origin for side in self._walls(problem)))
         put("force", *problem.actuator.bounds(n))
         if problem.free_duration:
             put("duration", *problem.duration_bounds)
@@ -105,6 +98,21 @@ class Program:
         self._release(problem, low, high)
         return lower / scale, upper / scale, low, high
 
+    def _walls(self, problem: TransferProblem) -> list[np.ndarray]:
+        """Lower and upper bounds of the coordinates, by the boxes that places keep to."""
+        sides: list[list[np.ndarray]] = [[], []]
+        for block in self.dynamics.configuration.coordinates.blocks:
+            mine = [one for one in problem.constraints if one.on == block.body and block.kind == PLACE]
+            boxes = [one.bounds(block.size) for one in mine]
+            for side, found in zip(sides, _intersection(boxes, block.size), strict=True):
+                side.append(found)
+        # A box that changes along the path has a row a node.
+        heads = [np.broadcast_shapes(*(part.shape[:-1] for part in side)) for side in sides]
+        return [
+            np.concatenate([np.broadcast_to(part, (*head, part.shape[-1])) for part in side], axis=-1)
+            for head, side in zip(heads, sides, strict=True)
+        ]
+
     def _release(self, problem: TransferProblem, low: np.ndarray, high: np.ndarray) -> None:
         """Free the limits on a boundary state that is fixed as a whole: no unknown is left there to meet them.
 
@@ -119,10 +127,19 @@ class Program:
                 elif group.owner and group.owner.field == "links" and group.kind == "node":
                     if not _looks_at(group.owner.of(problem), self.dynamics, np.isnan(position)):
                         low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
-                elif group.kind == "node" and not np.isnan(position).any():
+                elif group.kind == "node" and not np.isnan(position[self._of_owner(problem, group, 0)]).any():
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
-                if group.owner and group.owner.end == end and not np.isnan(velocity).any():
+                ends = bool(group.owner) and group.owner.end == end
+                if ends and not np.isnan(velocity[self._of_owner(problem, group, 1)]).any():
                     low[group.indices], high[group.indices] = -np.inf, np.inf
+
+    def _of_owner(self, problem: TransferProblem, group: Group, kind: int) -> np.ndarray:
+        """Which coordinates (0) or velocities (1) belong to the bodies that the owner of some rows limits."""
+        made = self.dynamics.configuration.coordinates
+        names = {block.body for block in made.blocks}
+        if group.owner and group.owner.field == "constraints":
+            names = set(group.owner.of(problem).bodies)
+        return np.any([made.of_body(name)[kind] for name in names], axis=0)
 
     def objective(self, scaled: float) -> float:
         """The objective in its own unit and sign."""

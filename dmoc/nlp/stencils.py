@@ -42,7 +42,7 @@ def stencils_of(
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
     same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
     # Numbers of the library's constraints are symbols or bounds, so their types are enough.
-    zones = [(type(constraint), getattr(constraint, "structure", None)) for constraint in problem.constraints]
+    zones = [(type(constraint), constraint.structure, constraint.on) for constraint in problem.constraints]
     shape = configuration_of(problem), problem.free_duration, order, hold, curved, joined
     make = partial(_written, problem, scheme(order), hold, curved, joined)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
@@ -132,11 +132,11 @@ class _Writer:
         for i, constraint in enumerate(self.constraints):
             at_gauss = [weighted(row[1:], moves) / h for row in rule.slopes_at(rule.gauss_points())]
             states = zip(rule.values_at(rule.gauss_points()), at_gauss, strict=True)
-            bodies = [body.body(self.origin + weighted(row, r), v) for row, v in states]
+            inside = [body.at(self.origin + weighted(row, r), v, self.mass) for row, v in states]
             rows = [
                 row._replace(name=str(g))
-                for g, one in enumerate(bodies)
-                for row in constraint.speed_rows_of(one)
+                for g, at in enumerate(inside)
+                for row in constraint.speed_rows_at(at)
             ]
             draft.limit(title(constraint, i), "step", rows, Owner("constraints", i))
         if self.hold:
@@ -206,8 +206,8 @@ class _Writer:
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
             _, q, w, _ = states[end]
-            here = body.body(q, body.velocity(q, w))
-            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows_of(here))]
+            at = body.at(q, body.velocity(q, w), self.mass)
+            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows_at(at))]
             for count, (i, rows) in enumerate(speed):
                 name = f"{end}.speed" + (f"_{count + 1}" if count else "")
                 draft.limit(name, "end", rows, Owner("constraints", i, end))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import Vector, vector
+from dmoc.basics.arguments import Vector, of_kind, vector
 from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape
@@ -42,7 +42,8 @@ class Constraint(ABC):
     which may change from one solve to the next without a rebuild, may be symbols inside `rows`.
 
     A constraint with a field `point` limits that point of a body that turns in place of the centre of mass:
-    `q` and `v` are then its position and velocity, in everything above.
+    `q` and `v` are then its position and velocity, in everything above. Of a system it limits the body that its
+    field `on` names.
 
     Examples
     --------
@@ -65,6 +66,8 @@ class Constraint(ABC):
     moves_body: ClassVar[bool] = True
     # The point of the body that it limits, in body axes from the centre of mass [m]; None for the centre.
     point: Any = None
+    # The body of a system that it limits, by its name; an only body has an empty one.
+    on: str = ""
 
     @property
     def structure(self) -> tuple:
@@ -83,12 +86,16 @@ class Constraint(ABC):
         return []
 
     def rows_at(self, t: Any, at: Mapping[str, Body], u: Any, m: Any) -> list[Row]:
-        """Rows that hold at every node, of bodies by their names; of the only one by default."""
-        return self.rows_of(t, next(iter(at.values())), u, m)
+        """Rows that hold at every node, of bodies by their names: of the one that it is `on` by default."""
+        return self.rows_of(t, at[self.on], u, m)
 
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
         """Rows that hold at every node, of a body as effects see it: of its position, or of a point of it."""
         return self.rows(t, self._place_and_velocity(body)[0], u, m)
+
+    def speed_rows_at(self, at: Mapping[str, Body]) -> list[Row]:
+        """Rows that hold at the Gauss points and at both ends, of bodies by their names."""
+        return self.speed_rows_of(at[self.on])
 
     def speed_rows_of(self, body: Body) -> list[Row]:
         """Rows that hold at the Gauss points and at both ends: of its velocity, or of that of a point of it."""
@@ -105,8 +112,13 @@ class Constraint(ABC):
         turned = body.rotation / size
         return body.position + turned @ point, body.velocity + turned @ ca.cross(body.rate / size, point)
 
+    def seen_of(self, made: Any, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`seen` of coordinates and independent velocities of all bodies, made of `Coordinates`."""
+        mine, moving = made.of_body(self.on)
+        return self.seen(q[:, mine], v[:, moving])
+
     def seen(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The part of coordinates and independent velocities, one row each, that `excess` takes.
+        """The part of coordinates and independent velocities of its body, one row each, that `excess` takes.
 
         Those of the position by default, the first three of a body that turns, or those of its `point`.
         """
@@ -115,6 +127,25 @@ class Constraint(ABC):
         attitude, arm = q[:, -QUATERNION:], np.broadcast_to(self.point, (len(q), AXES))
         swept = np.cross(v[:, -AXES:], arm)
         return q[:, :AXES] + rotated(attitude, arm), v[:, :AXES] + rotated(attitude, swept)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies that it limits; an only body has an empty name."""
+        return (self.on,)
+
+    @property
+    def subject(self) -> str:
+        """Whom `words` speak of."""
+        return self.on or "the body"
+
+    def named(self, index: int) -> str:
+        """What it is called in checks and messages, as the one at that place of a list: KeepOut 2 of hand."""
+        return f"{type(self).__name__} {index + 1}{self.of_body}"
+
+    @property
+    def of_body(self) -> str:
+        """What the name of a limit ends with: which body of a system it limits."""
+        return f" of {self.on}" if self.on else ""
 
     @property
     def of_point(self) -> str:
@@ -185,7 +216,7 @@ class Constraint(ABC):
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
         """In words, the limit that is enough; `amount` says by how much the rows give way, with its unit."""
-        return f"constraint {index}, {type(self).__name__}, to give way by {amount}"
+        return f"constraint {index}, {type(self).__name__}{self.of_body}, to give way by {amount}"
 
     def outline(self) -> tuple[Shape, ...]:
         """Its shapes in a picture."""
@@ -232,3 +263,15 @@ def checked_point(part: Constraint, value: Vector | None) -> tuple[float, ...] |
             f"got {len(found)}"
         )
     return found if any(found) else None
+
+
+def checked_on(part: Constraint) -> str:
+    """The name of the body that a part is on.
+
+    Raises
+    ------
+    ValueError
+        If it is no word.
+    """
+    of_kind(f"{type(part).__name__}: on", part.on, str)
+    return part.on

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
 from dmoc.basics.digits import down
-from dmoc.parts.constraint import Constraint, checked_point
+from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.outline import Ball, Shape
 from dmoc.parts.rows import Row
 
@@ -35,11 +35,14 @@ class KeepOut(Constraint):
         Radius [m].
     point : sequence of float, optional
         Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
+    on : str
+        The name of the body, where there are several.
     """
 
     center: Vector
     radius: float
     point: Vector | None = None
+    on: str = ""
 
     def __post_init__(self) -> None:
         checked(
@@ -47,6 +50,7 @@ class KeepOut(Constraint):
             center=vector("center", self.center, "m"),
             radius=number("radius", self.radius, "m", positive=True),
             point=checked_point(self, self.point),
+            on=checked_on(self),
         )
 
     @property
@@ -77,7 +81,7 @@ class KeepOut(Constraint):
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
         radius = down(eased.feature())
-        return f"keep-out {index} of at most {radius} m radius (you gave {self.radius:g} m)"
+        return f"keep-out {index}{self.of_body} of at most {radius} m radius (you gave {self.radius:g} m)"
 
     def outline(self) -> tuple[Shape, ...]:
         return (Ball(np.array(self.center), self.radius),)

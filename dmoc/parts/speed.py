@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, number
 from dmoc.basics.digits import up
-from dmoc.parts.constraint import Constraint, checked_point
+from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.rows import Row
 
 
@@ -25,15 +25,18 @@ class SpeedLimit(Constraint):
     point : sequence of float, optional
         Of a body that turns: the point that is meant, in body axes from the centre of mass [m]; the centre if
         not given.
+    on : str
+        The name of the body, where there are several.
     """
 
     limit: float
     point: Vector | None = None
+    on: str = ""
     unit: ClassVar[str] = "m/s"
 
     def __post_init__(self) -> None:
         limit = number("limit", self.limit, "m/s", positive=True)
-        checked(self, limit=limit, point=checked_point(self, self.point))
+        checked(self, limit=limit, point=checked_point(self, self.point), on=checked_on(self))
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -62,4 +65,5 @@ class SpeedLimit(Constraint):
         return self.times(float(np.sqrt(1 + slack)))
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
-        return f"a speed limit of {up(eased.largest_speed() or 0.0)} m/s (you gave {self.limit:g} m/s)"
+        enough = up(eased.largest_speed() or 0.0)
+        return f"a speed limit{self.of_body} of {enough} m/s (you gave {self.limit:g} m/s)"

@@ -20,7 +20,7 @@ from dmoc.basics.arguments import (
 )
 from dmoc.basics.digits import up
 from dmoc.effects.user_functions import as_column, tried
-from dmoc.parts.constraint import Constraint, checked_point
+from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.outline import Box, Cone, Shape
 from dmoc.parts.rows import Row
 
@@ -35,16 +35,19 @@ class KeepIn(Constraint):
         Opposite corners [m]; entries may be -inf and inf.
     point : sequence of float, optional
         Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
+    on : str
+        The name of the body, where there are several.
     """
 
     lower: Vector
     upper: Vector
     point: Vector | None = None
+    on: str = ""
 
     def __post_init__(self) -> None:
         checked(self, **{name: endless_vector(name, getattr(self, name), "m") for name in ("lower", "upper")})
         same_length("KeepIn", lower=self.lower, upper=self.upper)
-        checked(self, point=checked_point(self, self.point))
+        checked(self, point=checked_point(self, self.point), on=checked_on(self))
         for low, high in zip(self.lower, self.upper, strict=True):
             if low >= high:
                 raise ValueError(
@@ -111,6 +114,8 @@ class ApproachCone(Constraint):
         [m].
     point : sequence of float, optional
         Of a body that turns, in body axes from the centre of mass [m]; that centre if not given.
+    on : str
+        The name of the body, where there are several.
     """
 
     # A vector, or a function of the time.
@@ -119,6 +124,7 @@ class ApproachCone(Constraint):
     half_angle: float
     rounding: float = 1e-6
     point: Vector | None = None
+    on: str = ""
 
     def __post_init__(self) -> None:
         for name in ("apex", "axis"):
@@ -149,6 +155,7 @@ class ApproachCone(Constraint):
             half_angle=half_angle,
             rounding=number("rounding", self.rounding, "m", positive=True),
             point=checked_point(self, self.point),
+            on=checked_on(self),
         )
 
     @property
@@ -229,7 +236,7 @@ class ApproachCone(Constraint):
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
         half = up(eased.half_angle)
-        told = f"approach cone {index} of at least {half} rad half angle, {np.degrees(float(half)):.4g} degrees"
+        told = f"approach cone {index}{self.of_body} of at least {half} rad half angle, {np.degrees(float(half)):.4g} degrees"
         return f"{told} (you gave {self.half_angle:.4g} rad)"
 
     def words(self) -> str:

@@ -68,7 +68,7 @@ def _draw_links(axes: Any, solution: Solution, fine: np.ndarray, size: float) ->
     if solution.problem is None:
         return []
     few = np.linspace(0, len(fine) - 1, TIMES).astype(int)
-    at, drawn = states_of(configuration_of(solution.problem), fine[few]), []
+    at, drawn = states_of(solution.path.coordinates, fine[few]), []
     for link in solution.problem.links:
         for line in link.lines(at):
             for i, piece in enumerate(line):
@@ -103,7 +103,7 @@ def _joints(solution: Solution) -> list[Any]:
 def draw_joints(axes: Any, solution: Solution, late: float, unit: str) -> None:
     """The angles of hinges or the ways of slides, and their limits."""
     times, fine = _fine(solution)
-    at = states_of(configuration_of(solution.require_problem()), fine)
+    at = states_of(solution.path.coordinates, fine)
     ours = [joint for joint in _joints(solution) if joint.coordinate_units[0] == unit]
     values = [
         joint.measured(at[joint.to] if joint.to else room(len(times)), at[joint.on])[:, 0] for joint in ours

@@ -181,7 +181,7 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
     back = np.nanmin(speed) < -1e-6 * np.nanmax(np.abs(speed))
     limits = solution.problem.constraints if solution.problem else ()
     # The speed is that of the centre of mass.
-    for constraint in [one for one in limits if not one.turns_body and one.point is None]:
+    for constraint in [one for one in limits if not one.turns_body and one.point is None and not one.on]:
         if (limit := constraint.largest_speed()) is not None:
             for side in (limit, -limit) if back else (limit,):
                 axes.axhline(side / size, label="limit", **LIMIT)

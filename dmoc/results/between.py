@@ -89,18 +89,19 @@ def cuts(
         yield from _cuts_of(these, path, *_motion(these[0][1], path, velocity), (extent, speed, start_time))
 
 
-def _key(constraint: Constraint) -> tuple | None:
-    return None if constraint.point is None else tuple(constraint.point)
+def _key(constraint: Constraint) -> tuple[str, tuple | None]:
+    return constraint.on, None if constraint.point is None else tuple(constraint.point)
 
 
 def _motion(constraint: Constraint, path: DiscretePath, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] and velocities [m/s] at the nodes of what a constraint limits: the centre or a point."""
-    velocity = slopes[:, path.coordinates.places]
+    made = path.coordinates
+    mine = made.places & made.of_body(constraint.on)[0]
     if constraint.point is None:
-        return path.place, velocity
-    at = path.coordinates.quaternions[0]
+        return path.position[:, mine], slopes[:, mine]
+    at = made.quaternion_of(constraint.on)
     rate = 2 * product(conjugate(path.position[:, at]), slopes[:, at])[:, 1:]
-    return constraint.seen(path.position, np.hstack([velocity, rate]))
+    return constraint.seen(path.position[:, made.of_body(constraint.on)[0]], np.hstack([slopes[:, mine], rate]))
 
 
 def _cuts_of(
@@ -112,8 +113,8 @@ def _cuts_of(
 ) -> Iterator[Cut]:
     """`cuts` of constraints that limit the same point of the body, of which these are the motion at nodes."""
     extent, speed, start_time = scales
-    if ours[0][1].point is not None:
-        # A point far off the centre of a body that turns goes further and faster than the centre.
+    if ours[0][1].point is not None or ours[0][1].on:
+        # A point far off the centre of a body that turns, or one of several bodies, goes further and faster.
         extent = max(extent, float(np.linalg.norm(np.ptp(place, axis=0))))
         speed = max(speed, float(np.linalg.norm(velocity, axis=1).max()))
     longest = float(np.linalg.norm(np.diff(place, axis=0), axis=1).max())
@@ -126,7 +127,7 @@ def _cuts_of(
     sway = _most(np.linalg.norm(moving - straight, axis=1)) + 0.5 * _bump(path, velocity)
     still, none = np.zeros_like(inside), np.empty(0, int)
     for i, constraint in ours:
-        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
+        name, unit = constraint.named(i), constraint.unit
         if constraint.limits_speed:
             allowed = BOUND * speed + min(sway, DEEPEST * speed)
             yield Cut(name, i, _most(constraint.excess_at(times, inside, moving)), allowed, "m/s", none)
@@ -165,16 +166,14 @@ def turn_cuts(
     if not ours:
         return
     rule, steps = scheme(path.order), len(path.mesh) - 1
-    attitude, at = path.attitudes[0], step_nodes(steps, rule)
+    made, at = path.coordinates, step_nodes(steps, rule)
     places = np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]
-    found = np.einsum("pj,jkn->kpn", rule.values_at(places), attitude[at])
-    inside = normalised(found).reshape(-1, QUATERNION)
     fractions = (path.mesh[:-1, None] + np.diff(path.mesh)[:, None] * places).ravel()
     times = start_time + path.duration * path.fractions
     apart, none = path.largest_turn, np.empty(0, int)
     for i, constraint in ours:
-        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
-        turned, moving = constraint.seen(path.position, velocity)
+        name, unit = constraint.named(i), constraint.unit
+        turned, moving = constraint.seen_of(made, path.position, velocity)
         at_nodes = _most(constraint.excess_at(times, turned, moving))
         if constraint.limits_speed:
             limit = constraint.largest_speed() or 0.0
@@ -182,6 +181,9 @@ def turn_cuts(
             yield Cut(name, i, at_nodes, BOUND * limit + sway, unit, none)
             continue
         yield Cut(f"{name} at nodes", i, at_nodes, np.degrees(BOUND), unit, none)
+        attitude = path.position[:, made.quaternion_of(constraint.on)]
+        found = np.einsum("pj,jkn->kpn", rule.values_at(places), attitude[at])
+        inside = normalised(found).reshape(-1, QUATERNION)
         angle = np.radians(constraint.feature_angle())
         depth = apart**2 / (8 * np.tan(min(angle, np.pi - angle)) or 1.0)
         allowed = float(np.degrees(BOUND + min(depth, DEEPEST * angle)))
@@ -205,11 +207,12 @@ def _joint_cuts(constraints: Sequence[Constraint], path: DiscretePath) -> Iterat
     places = np.linspace(0.0, 1.0, FEWEST * rule.degree + 1)[:-1]
     found = np.einsum("pj,jkn->kpn", rule.values_at(places), path.position[step_nodes(steps, rule)])
     inside = found.reshape(-1, found.shape[2])
-    for at in path.coordinates.quaternions:
+    made = path.coordinates
+    for at in made.quaternions:
         inside[:, at] = normalised(inside[:, at])
     for i, constraint in ours:
-        name, unit = f"{type(constraint).__name__} {i + 1}", constraint.unit
-        nodes, between = (constraint.seen(q, np.zeros_like(q))[0] for q in (path.position, inside))
+        name, unit = constraint.named(i), constraint.unit
+        nodes, between = (constraint.seen_of(made, q, np.zeros_like(q))[0] for q in (path.position, inside))
         way = float(np.ptp(nodes)) or 1.0
         at_nodes = constraint.excess(nodes, nodes)
         size = 1.0 if unit == "rad" else way

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.configurations.of_problem import free_configuration
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.mixed import with_both
@@ -22,7 +23,7 @@ from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
-from dmoc.scene.systems import check_links, check_pushed, limits_placed, of_system
+from dmoc.scene.systems import check_limited, check_links, check_pushed, of_system
 
 # A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
 # the solver keeps it that far away.
@@ -126,7 +127,7 @@ class TransferProblem:
             part.check_dimension(self.dimension)
             check_acts_on(part, self.turns, self.start.has_position)
         self._check_clock()
-        checked(self, **limits_placed(self))
+        check_limited(self)
         check_functions(self)
         self._check_objective()
         self._check_ends()
@@ -142,6 +143,11 @@ class TransferProblem:
     def dimension(self) -> int:
         """Number of axes, 1 to 3."""
         return self.start.dimension
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its bodies; an only body has an empty name."""
+        return ("",) if self.system is None else self.system.names
 
     @property
     def size(self) -> int:
@@ -226,10 +232,11 @@ class TransferProblem:
 
     def _check_ends(self) -> None:
         """A boundary state that breaks a constraint can never be met, whatever the path."""
+        made = free_configuration(self).coordinates if self.constraints else None
         for end in ("start", "goal"):
             position, velocity = getattr(self, end).fixed()
             for i, constraint in enumerate(self.constraints):
-                state = constraint.seen(position[None], velocity[None])
+                state = constraint.seen_of(made, position[None], velocity[None])
                 known = state[1] if constraint.limits_speed else state[0]
                 if np.isnan(known).any():
                     continue
@@ -239,7 +246,7 @@ class TransferProblem:
                     name = f"{type(constraint).__name__} (constraint {i + 1})"
                     raise ValueError(
                         f"{end} breaks {name} by {excess:.3g} {constraint.unit}: "
-                        f"the body {constraint.words()}; move the {end} or the constraint"
+                        f"{constraint.subject} {constraint.words()}; move the {end} or the constraint"
                     )
 
     def _time_of(self, end: str) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -39,8 +38,6 @@ def of_system(problem: Any) -> dict[str, Any]:
         )
     if problem.inertia is not None:
         raise ValueError("bodies of a system have their own inertia; leave out that of the problem")
-    if any(not getattr(limit, "limits_joint", False) for limit in entries(problem.constraints) or ()):
-        raise ValueError("zones and speed limits are for a single body so far; leave out the constraints")
     # What only several bodies have is loaded for them alone.
     from dmoc.ends.each import each_of
 
@@ -56,13 +53,14 @@ def of_system(problem: Any) -> dict[str, Any]:
     }
 
 
-def limits_placed(problem: Any) -> dict[str, Any]:
-    """The constraints of a problem, those on joints with the coordinates of all bodies.
+def check_limited(problem: Any) -> None:
+    """Each limit must be of a body that there is and that has what it limits.
 
     Raises
     ------
     ValueError
-        If a limit, a spring or a damper sits in a joint that is none of the links.
+        If it names none of several bodies or one that there is not, limits the attitude of a point mass, or if a
+        limit, a spring or a damper sits in a joint that is none of the links.
     """
     for part in (*problem.effects, *problem.constraints):
         joint = getattr(part, "joint", None)
@@ -70,12 +68,22 @@ def limits_placed(problem: Any) -> dict[str, Any]:
             raise ValueError(
                 f"{type(part).__name__} sits in a {type(joint).__name__} that is no link; list it there"
             )
-    limits = [limit for limit in problem.constraints if limit.limits_joint]
-    if not limits:
-        return {}
-    body = free_configuration(problem)
-    placed = (replace(one, body=body) if one.limits_joint else one for one in problem.constraints)
-    return {"constraints": tuple(placed)}
+    names = problem.names
+    turning = [body.name for body in problem.system.bodies if body.inertia is not None] if problem.system else []
+    for i, limit in enumerate(problem.constraints):
+        kind = f"{type(limit).__name__} (constraint {i + 1})"
+        for name in limit.bodies:
+            if problem.system is not None and not name:
+                raise ValueError(
+                    f"{kind} does not say which of the bodies {', '.join(names)} it limits; give it "
+                    f"on={names[0]!r}"
+                )
+            if name not in names:
+                raise ValueError(f"{kind} limits {short(name)}; {_known(names)}")
+            if name and name not in turning and (limit.turns_body or limit.point is not None):
+                raise ValueError(
+                    f"{kind} is for a body that turns, and {name} is a point mass; give it an inertia [kg m^2]"
+                )
 
 
 def check_pushed(problem: Any) -> None:
@@ -86,7 +94,7 @@ def check_pushed(problem: Any) -> None:
     ValueError
         If it names others, acts on a body of which there are several, or turns a point mass.
     """
-    names = ("",) if problem.system is None else problem.system.names
+    names = problem.names
     points = [] if problem.system is None else [b.name for b in problem.system.bodies if b.inertia is None]
     for effect in problem.effects if points else ():
         if effect.turns_body:
