@@ -143,7 +143,8 @@ class PointingKeepOut(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine < 1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-out {index}{self.of_body} of at most {down(eased.angle)} degrees (you gave {self.angle:g})"
+        enough = down(eased.angle)
+        return f"pointing keep-out {index}{self.of_body} of at most {enough} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()
@@ -179,7 +180,8 @@ class PointingKeepIn(_Cone):
         return replace(self, angle=float(np.degrees(np.arccos(cosine)))) if cosine > -1 else None
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
-        return f"pointing keep-in {index}{self.of_body} of at least {up(eased.angle)} degrees (you gave {self.angle:g})"
+        enough = up(eased.angle)
+        return f"pointing keep-in {index}{self.of_body} of at least {enough} degrees (you gave {self.angle:g})"
 
     def words(self) -> str:
         axis, toward = self._where()

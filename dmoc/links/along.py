@@ -52,6 +52,8 @@ def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.nd
     no such way, the path goes on from place to place towards the goal as far as they let it.
     """
     start, goal, likely = ends
+    if not body.conditions:
+        return start + fractions[:, None] * (np.where(np.isnan(goal), likely, goal) - start)
     on = _OnLinks(body)
     aim = on.put(np.where(np.isnan(goal), likely, goal), ~np.isnan(goal))
     straight = start + fractions[:, None] * (aim - start)

@@ -73,6 +73,9 @@ class JointLimit(Constraint):
         high = np.inf if self.high is None else self.high
         return [Row(self.joint.name, self.joint.coordinate(at), low, high, self.unit)]
 
+    def speed_rows_at(self, at: Mapping[str, Body]) -> list[Row]:
+        return []
+
     def seen_of(self, made: Any, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at = states_of(made, q)
         base = at[self.joint.to] if self.joint.to else room(len(q))

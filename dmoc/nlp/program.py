@@ -129,8 +129,11 @@ class Program:
                         low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
                 elif group.kind == "node" and not np.isnan(position[self._of_owner(problem, group, 0)]).any():
                     low[group.indices[:, place]], high[group.indices[:, place]] = -np.inf, np.inf
-                ends = bool(group.owner) and group.owner.end == end
-                if ends and not np.isnan(velocity[self._of_owner(problem, group, 1)]).any():
+                if (
+                    group.owner
+                    and group.owner.end == end
+                    and not np.isnan(velocity[self._of_owner(problem, group, 1)]).any()
+                ):
                     low[group.indices], high[group.indices] = -np.inf, np.inf
 
     def _of_owner(self, problem: TransferProblem, group: Group, kind: int) -> np.ndarray:

@@ -92,7 +92,7 @@ class _Writer:
         at = body.at(q, ca.DM.zeros(n), m) if self.constraints else {}
         for i, constraint in enumerate(self.constraints):
             rows = constraint.rows_at(t, at, u, m)
-            draft.limit(title(constraint, i), "node", rows, Owner("constraints", i))
+            draft.limit(constraint.title(i), "node", rows, Owner("constraints", i))
         if u is not None:
             draft.limit("actuator", "control", self.actuator.rows(u), Owner("actuator"))
         if not self._cost_in_steps():
@@ -134,11 +134,9 @@ class _Writer:
             states = zip(rule.values_at(rule.gauss_points()), at_gauss, strict=True)
             inside = [body.at(self.origin + weighted(row, r), v, self.mass) for row, v in states]
             rows = [
-                row._replace(name=str(g))
-                for g, at in enumerate(inside)
-                for row in constraint.speed_rows_at(at)
+                row._replace(name=str(g)) for g, at in enumerate(inside) for row in constraint.speed_rows_at(at)
             ]
-            draft.limit(title(constraint, i), "step", rows, Owner("constraints", i))
+            draft.limit(constraint.title(i), "step", rows, Owner("constraints", i))
         if self.hold:
             draft.limit("actuator", "control", self.actuator.rows(u[0]), Owner("actuator"))
         if problem.actuator.burns:
@@ -206,10 +204,10 @@ class _Writer:
         for end, condition in (("start", self.start), ("goal", self.goal)):
             draft.limit(f"{end}.condition", "end", condition.rows(*states[end]), Owner(end))
             _, q, w, _ = states[end]
-            at = body.at(q, body.velocity(q, w), self.mass)
-            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows_at(at))]
+            here = body.at(q, body.velocity(q, w), self.mass)
+            speed = [(i, rows) for i, one in enumerate(self.constraints) if (rows := one.speed_rows_at(here))]
             for count, (i, rows) in enumerate(speed):
-                name = f"{end}.speed" + (f"_{count + 1}" if count else "")
+                name = f"{end}.speed" + (f"_{count + 1}" if count else "") + self.constraints[i].row_of_body
                 draft.limit(name, "end", rows, Owner("constraints", i, end))
         t, q, w, m = states["goal"]
         seen = self._seen((t, q, body.velocity(q, w), m))

@@ -14,7 +14,7 @@ from dmoc.basics.arguments import Vector, of_kind, vector
 from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape
-from dmoc.parts.rows import Row
+from dmoc.parts.rows import Row, title
 
 
 class Constraint(ABC):
@@ -141,6 +141,15 @@ class Constraint(ABC):
     def named(self, index: int) -> str:
         """What it is called in checks and messages, as the one at that place of a list: KeepOut 2 of hand."""
         return f"{type(self).__name__} {index + 1}{self.of_body}"
+
+    def title(self, index: int) -> str:
+        """The name of its rows: keep_out_2_of_hand."""
+        return title(self, index) + self.row_of_body
+
+    @property
+    def row_of_body(self) -> str:
+        """What the names of its rows end with."""
+        return self.of_body.replace(" ", "_")
 
     @property
     def of_body(self) -> str:

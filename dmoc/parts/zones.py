@@ -236,8 +236,8 @@ class ApproachCone(Constraint):
 
     def needs(self, eased: Any, index: int, amount: str) -> str:
         half = up(eased.half_angle)
-        told = f"approach cone {index}{self.of_body} of at least {half} rad half angle, {np.degrees(float(half)):.4g} degrees"
-        return f"{told} (you gave {self.half_angle:.4g} rad)"
+        enough = f"at least {half} rad half angle, {np.degrees(float(half)):.4g} degrees"
+        return f"approach cone {index}{self.of_body} of {enough} (you gave {self.half_angle:.4g} rad)"
 
     def words(self) -> str:
         angle = np.degrees(self.half_angle)

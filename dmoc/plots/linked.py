@@ -12,6 +12,8 @@ from dmoc.links.along import states_of
 from dmoc.links.joint import room
 from dmoc.plots.path import entries_once
 from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, readable, within_steps
+from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.plots.turning import paths_of_points
 from dmoc.results.solution import Solution
 
 # Links are drawn at this many times.
@@ -20,6 +22,8 @@ TIMES = 9
 MARGIN = 0.08
 # Labels of the axes in space are this far from the axes [points].
 LABELS_OFF = 14
+# With a label of more letters than this a row of the legend has three entries.
+LONG_LABEL = 20
 # Of more reactions than this the magnitudes are drawn, one curve a link.
 MOST_CURVES = 4
 
@@ -37,21 +41,28 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
         for place, marker, name in ((0, "o", "start"), (-1, "*", "goal")):
             style = {"markersize": 8 if marker == "o" else 13, "markerfacecolor": "white", "zorder": 6}
             axes.plot(*path[place, :, None], marker, markeredgecolor=colour, label=name, **style)
-    shown = _draw_links(axes, solution, fine, size)
+    shown = [*paths.values(), *_draw_links(axes, solution, fine, size)]
+    for label, swept in paths_of_points(solution).items():
+        axes.plot(*swept.T / size, color=DARK, linestyle="--", linewidth=1.5, label=label, zorder=3)
+        shown.append(swept / size)
+    view = view_of(solution, size * np.vstack([piece.reshape(-1, solution.dimension) for piece in shown]))
+    proxies = draw_scene(axes, solution, (view[0] / size, view[1] / size), size)
     if solution.dimension == 2:
-        axes.set_aspect("equal")
-        axes.margins(MARGIN)
+        axes.dataLim.set_points(np.array(view) / size)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0)
     else:
-        _set_box(axes, np.vstack([*paths.values(), *shown]))
+        _set_box(axes, np.array(view) / size)
         axes.set_zlabel(f"z [{unit}]", labelpad=LABELS_OFF)
     # In space labels are kept off the numbers of an axis that is seen slantwise.
     off = LABELS_OFF if solution.dimension == 3 else None
     axes.set_xlabel(f"x [{unit}]", labelpad=off)
     axes.set_ylabel(f"y [{unit}]", labelpad=off)
     axes.set_title("Path", loc="left")
-    handles, labels = entries_once(axes)
+    handles, labels = entries_once(axes, proxies)
     below = -0.06 if solution.dimension == 3 else -0.11
-    axes.legend(handles, labels, ncol=4, loc="upper center", bbox_to_anchor=(0.5, below))
+    columns = 3 if max(map(len, labels)) > LONG_LABEL else 4
+    axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
 
 
 def _fine(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
@@ -80,12 +91,17 @@ def _draw_links(axes: Any, solution: Solution, fine: np.ndarray, size: float) ->
 
 def _set_box(axes: Any, points: np.ndarray) -> None:
     """Equal scales in space, in a box that is nowhere thinner than a fifth of its longest side."""
+    from matplotlib.ticker import MaxNLocator
+
     low, high = points.min(axis=0), points.max(axis=0)
     middle, side = 0.5 * (low + high), (high - low) * (1 + MARGIN)
     side = np.maximum(side, 0.2 * side.max())
     axes.set(
         **{f"{axis}lim": (middle[i] - side[i] / 2, middle[i] + side[i] / 2) for i, axis in enumerate("xyz")}
     )
+    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), side, strict=True):
+        # A short side has room for few numbers.
+        axis.set_major_locator(MaxNLocator(2 + round(4 * span / side.max())))
     axes.set_box_aspect(side)
 
 

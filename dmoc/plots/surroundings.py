@@ -159,7 +159,8 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
 def _cone(solution: Solution, cone: Cone) -> np.ndarray:
     """Points of a cone from the tip to as deep as the path goes [m], shape (axes, depths, around)."""
     axis, apex = cone.axis, cone.apex
-    depth = float(np.nanmax((solution.position - apex) @ axis, initial=0.0))
+    places = solution.position.reshape(-1, solution.dimension)
+    depth = float(np.nanmax((places - apex) @ axis, initial=0.0))
     # In the plane the three angles lead to one side of the axis, to the other and back; in space they go round.
     across = np.linalg.svd(axis[None])[2][1:]
     around = np.linspace(0, 2 * np.pi, 3 if len(axis) == 2 else 37)

@@ -103,16 +103,18 @@ def draw_triads(axes: Any, solution: Solution, size: float) -> None:
 def paths_of_points(solution: Solution) -> dict[str, np.ndarray]:
     """The paths of points of the body that have limits of their own [m], by the label of each."""
     limits = solution.problem.constraints if solution.problem else ()
-    points = {tuple(one.point) for one in limits if one.point is not None}
+    points = {(one.on, tuple(one.point)): one for one in limits if one.point is not None}
     if not points:
         return {}
-    place, attitude = (
-        within_steps(solution, part)[1] for part in (solution.position, solution.path.attitudes[0])
-    )
+    made, fine = solution.path.coordinates, within_steps(solution, solution.path.position)[1].copy()
+    for at in made.quaternions:
+        fine[:, at] = normalised(fine[:, at])
+    still = np.zeros((len(fine), made.motions.size))
     return {
-        f"path of point ({', '.join(f'{x:g}' for x in point)}) m": place
-        + rotated(normalised(attitude), np.broadcast_to(point, place.shape))
-        for point in sorted(points)
+        f"path of point ({', '.join(f'{x:g}' for x in point)}) m{one.of_body}": one.seen_of(made, fine, still)[
+            0
+        ]
+        for (_, point), one in sorted(points.items(), key=lambda known: known[0])
     }
 
 

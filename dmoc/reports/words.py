@@ -47,7 +47,7 @@ def scene(problem: TransferProblem) -> RenderableType:
             ("actuator", problem.actuator.words()),
             ("objective", _objective(problem)),
             *([("links", [link.words() for link in problem.links])] if problem.links else []),
-            ("constraints", [constraint.words() for constraint in problem.constraints] or "none"),
+            ("constraints", [f"{one.on} {one.words()}".strip() for one in problem.constraints] or "none"),
         ]
     )
 

@@ -59,8 +59,8 @@ def check_limited(problem: Any) -> None:
     Raises
     ------
     ValueError
-        If it names none of several bodies or one that there is not, limits the attitude of a point mass, or if a
-        limit, a spring or a damper sits in a joint that is none of the links.
+        If it names none of several bodies or one that there is not, limits the attitude of a point mass, or if
+        a limit, a spring or a damper sits in a joint that is none of the links.
     """
     for part in (*problem.effects, *problem.constraints):
         joint = getattr(part, "joint", None)
@@ -69,7 +69,9 @@ def check_limited(problem: Any) -> None:
                 f"{type(part).__name__} sits in a {type(joint).__name__} that is no link; list it there"
             )
     names = problem.names
-    turning = [body.name for body in problem.system.bodies if body.inertia is not None] if problem.system else []
+    turning = (
+        [body.name for body in problem.system.bodies if body.inertia is not None] if problem.system else []
+    )
     for i, limit in enumerate(problem.constraints):
         kind = f"{type(limit).__name__} (constraint {i + 1})"
         for name in limit.bodies:

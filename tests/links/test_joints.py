@@ -274,7 +274,7 @@ def test_a_free_flyer_reaches_with_its_arm_while_its_base_is_free(tmp_path):
     problem = load_problem("arm_in_space").make()
     found = solve(problem)
     assert found.success and not failed(found)
-    at = states_of(configuration_of(problem), found.path.position)
+    at = states_of(found.path.coordinates, found.path.position)
     angles = [link.measured(at[link.to], at[link.on])[-1, 0] for link in problem.links]
     np.testing.assert_allclose(angles, (1.0, -1.4), atol=1e-9)
     _, spin = total(problem, found)
@@ -391,7 +391,7 @@ def test_a_joint_stops_at_its_stop():
     for problem in (free, limited):
         found = solve(problem, steps=20)
         assert found.success and not failed(found)
-        at = states_of(configuration_of(problem), found.path.position)
+        at = states_of(found.path.coordinates, found.path.position)
         angles.append(ELBOW.measured(at["upper"], at["fore"]).max())
     assert angles[0] > 2.7 and angles[1] == pytest.approx(2.45, abs=1e-6)
     through = replace(solve(free, steps=20), problem=limited)

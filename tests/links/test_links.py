@@ -344,7 +344,7 @@ BAD = {
     "a name too long": (lambda: Member(41 * "a", 1.0), "at most 40 of them"),
     "an end of a stranger": (lambda: arm(goal={"hand": State((0, 0), (0, 0))}), "names 'hand'"),
     "no dictionary": (lambda: arm(goal=State((0, 0), (0, 0))), "must be a dictionary"),
-    "a zone for a system": (lambda: arm(constraints=[KeepOut((1, 1), 0.1)]), "single body"),
+    "a zone for a system": (lambda: arm(constraints=[KeepOut((1, 1), 0.1)]), "which of the bodies"),
     "a push on no body": (lambda: cart_pole(actuator=BoxForce(1.0)), "does not say which of the bodies"),
     "no actuator": (lambda: cart_pole(actuator=FreeForce()), "does not say which of the bodies"),
     "a push on a stranger": (lambda: cart_pole(actuator=On("cat", BoxForce(1.0))), "acts on 'cat'"),
