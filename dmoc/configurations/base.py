@@ -100,6 +100,12 @@ class Configuration(ABC):
         """The units of the equations of each link."""
         return ()
 
+    @property
+    def reaction_units(self) -> tuple[str, ...]:
+        """The units of the forces per unit mass that keep g at zero; torques keep quaternions and angles."""
+        linked = [unit for link in self.link_units for unit in link]
+        return ("m^2/s^2",) * self.surplus + tuple("m/s^2" if unit == "m" else "m^2/s^2" for unit in linked)
+
     def links_at(self, q: Any) -> Any:
         """The entries of g that belong to links."""
         return ca.SX.zeros(0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -52,6 +52,12 @@ class Coordinates:
         """Those of a rigid body: place (if there are axes), wheels (if there are some), attitude."""
         blocks = Block(PLACE, axes), Block(WHEELS, wheels), Block(ATTITUDE, QUATERNION)
         return cls(tuple(block for block in blocks if block.size))
+
+    @classmethod
+    def side_by_side(cls, bodies: Mapping[str, Coordinates]) -> Coordinates:
+        """Those of several bodies by their names: first the places of all, then what turns."""
+        named = [block._replace(body=name) for name, made in bodies.items() for block in made.blocks]
+        return cls(tuple(sorted(named, key=lambda block: block.kind != PLACE)))
 
     @cached_property
     def kinds(self) -> np.ndarray:

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.configurations.base import Configuration
-from dmoc.configurations.coordinates import PLACE, Coordinates
+from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body
 
 
@@ -50,12 +50,8 @@ class Many(Configuration):
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        named = [
-            block._replace(body=name)
-            for name, part in zip(self.bodies, self.parts, strict=True)
-            for block in part.coordinates.blocks
-        ]
-        return Coordinates(tuple(sorted(named, key=lambda block: block.kind != PLACE)))
+        pairs = zip(self.bodies, self.parts, strict=True)
+        return Coordinates.side_by_side({name: part.coordinates for name, part in pairs})
 
     @cached_property
     def _entries(self) -> list[np.ndarray]:

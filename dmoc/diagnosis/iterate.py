@@ -161,5 +161,7 @@ def _unit_of_unknown(nlp: Program, problem: TransferProblem, group: Group, compo
         return str(blocks.sized("m", "-", "N m s^2")[component])
     if group.name.endswith(".velocity"):
         return str(blocks.paced("m/s", "rad/s", "N m s")[component])
-    units = {"mass": "kg", LEG_MASS: "kg", "duration": "s", LEG_START: "s", "reaction": "m^2/s^2"}
+    if group.name == "reaction":
+        return nlp.dynamics.configuration.reaction_units[component]
+    units = {"mass": "kg", LEG_MASS: "kg", "duration": "s", LEG_START: "s"}
     return units.get(group.name) or problem.actuator.units(problem.dimension)[component]

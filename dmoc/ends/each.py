@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, short
 from dmoc.basics.quaternions import AXES, rotation_of
+from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body
 from dmoc.ends.base import Boundary, State
 from dmoc.ends.joint_states import JointState, carried_along
@@ -35,7 +37,7 @@ class Each(Boundary):
 
     names: tuple[str, ...]
     states: tuple[Boundary, ...]
-    joints: tuple[tuple[Holonomic, JointState], ...] = ()
+    joints: tuple[tuple[Any, JointState], ...] = ()
     led: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -43,6 +45,36 @@ class Each(Boundary):
         if len(sizes) > 1:
             raise ValueError(f"states of one system must have as many axes; got {sorted(sizes)}")
         checked(self, states=tuple(self.states))
+        # What is asked of joints, each number under a name of its own: it may change from solve to solve.
+        for (_, state), names in zip(self.joints, self._named, strict=True):
+            for name, value in zip(names, state.asked.values(), strict=True):
+                object.__setattr__(self, name, value)
+
+    @property
+    def _named(self) -> list[list[str]]:
+        """Names for the numbers that are asked of each joint, such as elbow_value and elbow_rate."""
+        several = Counter(joint.name for joint, _ in self.joints)
+        return [
+            [
+                f"{joint.name}_{i + 1}_{name}" if several[joint.name] > 1 else f"{joint.name}_{name}"
+                for name in state.asked
+            ]
+            for i, (joint, state) in enumerate(self.joints)
+        ]
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
+        return tuple(name for names in self._named for name in names)
+
+    @property
+    def units_of_numbers(self) -> dict[str, str]:
+        """The unit of each number in `adjustable`."""
+        pairs = zip(self.joints, self._named, strict=True)
+        return {
+            name: joint.coordinate_units[kind == "rate"] if joint.coordinates == 1 or kind == "rate" else ""
+            for (joint, state), names in pairs
+            for name, kind in zip(names, state.asked, strict=True)
+        }
 
     @property
     def dimension(self) -> int:
@@ -50,7 +82,8 @@ class Each(Boundary):
 
     @property
     def structure(self) -> tuple:
-        return type(self), self.names, self.joints
+        joints = tuple((joint, tuple(state.asked), np.ndim(state.value)) for joint, state in self.joints)
+        return type(self), self.names, joints
 
     @property
     def turns_body(self) -> bool:
@@ -65,7 +98,7 @@ class Each(Boundary):
 
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         known = [state.fixed() for state in self.states]
-        return tuple(_places_first([one[i] for one in known], self.dimension) for i in (0, 1))  # type: ignore
+        return self._stacked([q for q, _ in known], 0), self._stacked([v for _, v in known], 1)
 
     def likely(self, start: Boundary) -> np.ndarray:
         """Coordinates for a guess: what is free stays where it starts, and joints carry what is on them."""
@@ -76,39 +109,49 @@ class Each(Boundary):
         bases = {name: state for name, state in known.items() if name not in carried}
         turning = [name for name, state in known.items() if state.turns_body]
         led, _ = carried_along(bases, asked, turning, (), self.dimension)
-        return _places_first([(known | led)[name].fixed()[0] for name in self.names], self.dimension)
+        return self._stacked([(known | led)[name].fixed()[0] for name in self.names], 0)
 
     def rows(self, t: Any, q: Any, v: Any, m: Any) -> list[Row]:
         if not self.joints:
             return []
         at = self._bodies(q, v)
         found = []
-        for joint, state in self.joints:
-            found += state.rows_of(joint, at)
+        for (joint, state), names in zip(self.joints, self._named, strict=True):
+            asked = {kind: getattr(self, name) for kind, name in zip(state.asked, names, strict=True)}
+            found += state.rows_of(joint, at, asked)
         return found
 
     def _bodies(self, q: Any, v: Any) -> dict[str, Body]:
         """The bodies by name, for CasADi coordinates and independent velocities."""
-        axes, count = self.dimension, len(self.names)
-        turn, rate, found = count * axes, count * axes, {}
-        for i, (name, state) in enumerate(zip(self.names, self.states, strict=True)):
-            mine = slice(i * axes, (i + 1) * axes)
-            found[name] = Body(q[mine], v[mine])
+        found = {}
+        for name, state in zip(self.names, self.states, strict=True):
+            mine, moving = (np.flatnonzero(part).tolist() for part in self._made.of_body(name))
+            axes = state.dimension
+            place, speed = q[mine[:axes]], v[moving[:axes]]
+            found[name] = Body(place, speed)
             if state.turns_body:
-                attitude = q[turn : turn + 4]
-                spin = v[rate : rate + AXES]
-                found[name] = Body(q[mine], v[mine], attitude, rotation_of(attitude), spin)
-                turn, rate = turn + 4, rate + AXES
+                attitude = q[mine[axes:]]
+                found[name] = Body(place, speed, attitude, rotation_of(attitude), v[moving[axes:]])
+        return found
+
+    @property
+    def _made(self) -> Coordinates:
+        """Of what parts the coordinates of all bodies are made."""
+        pairs = zip(self.names, self.states, strict=True)
+        kinds = {True: Coordinates.of_rigid_body, False: Coordinates.of_point}
+        return Coordinates.side_by_side({name: kinds[one.turns_body](one.dimension) for name, one in pairs})
+
+    def _stacked(self, parts: Sequence[np.ndarray], kind: int) -> np.ndarray:
+        """The coordinates (0) or the independent velocities (1) of all bodies from those of each."""
+        masks = [self._made.of_body(name)[kind] for name in self.names]
+        found = np.empty(len(masks[0]))
+        for mine, part in zip(masks, parts, strict=True):
+            found[mine] = part
         return found
 
     def words(self) -> str:
         named = [f"{name}: {state.words()}" for name, state in zip(self.names, self.states, strict=True)]
         return "; ".join([*named, *(f"{joint.words()}: {state.words()}" for joint, state in self.joints)])
-
-
-def _places_first(parts: Sequence[np.ndarray], axes: int) -> np.ndarray:
-    """Columns of bodies joined: first the places of all, then what turns."""
-    return np.concatenate([*[part[:axes] for part in parts], *[part[axes:] for part in parts]])
 
 
 def each_of(name: str, given: Any, system: System, links: Sequence[Holonomic]) -> Each:

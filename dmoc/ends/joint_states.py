@@ -87,14 +87,23 @@ class JointState:
         count = AXES if value.shape[1] == QUATERNION else 1
         return value, np.broadcast_to(np.array(self.rate, float), (1, count))
 
-    def rows_of(self, joint: Any, at: Mapping[str, Body]) -> list[Row]:
-        """Rows that are zero where bodies of CasADi expressions are so."""
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The numbers that it fixes: value, rate or both."""
+        return {
+            name: value for name, value in (("value", self.value), ("rate", self.rate)) if value is not None
+        }
+
+    def rows_of(self, joint: Any, at: Mapping[str, Body], asked: Mapping[str, Any]) -> list[Row]:
+        """Rows that are zero where bodies of CasADi expressions are so; `asked` may be symbols."""
         found, units = [], joint.coordinate_units
         wanted = []
-        if self.value is not None:
-            wanted.append(("value", joint.off(at, self.value), units[0]))
-        if self.rate is not None:
-            wanted.append(("rate", joint.rate(at) - ca.DM(np.atleast_1d(self.rate)), units[1]))
+        if "value" in asked:
+            wanted.append(("value", joint.off(at, asked["value"]), units[0]))
+        if "rate" in asked:
+            rate = asked["rate"]
+            rate = rate if isinstance(rate, ca.SX) else ca.DM(np.atleast_1d(rate))
+            wanted.append(("rate", joint.rate(at) - rate, units[1]))
         for name, gap, unit in wanted:
             entries_of = ca.vertsplit(ca.vec(ca.SX(gap)))
             labels = [""] if len(entries_of) == 1 else [f".{axis}" for axis in "xyz"]

@@ -82,8 +82,15 @@ class Scene:
             return {}
         units = dict.fromkeys(self.problem.actuator.units(self.axes))
         found = {"forces": Term(", ".join(units), TERMS["forces"].words)}
-        if not self.turns:
-            found["reactions"] = Term("m/s^2", "forces of links per unit mass, one column a node")
+        gaps = dict.fromkeys(unit for link in self.dynamics.configuration.link_units for unit in link)
+        gap = ", ".join(gaps)
+        exerted = ", ".join(dict.fromkeys(self.dynamics.configuration.reaction_units))
+        found["residual_links"] = Term(gap, TERMS["residual_links"].words)
+        found["largest_residual_links"] = Term(gap, "largest gap of a link")
+        words = "forces per unit mass that keep quaternions unit ones, then those of links, one column a node"
+        found["reactions"] = Term(
+            exerted, words if self.turns else "forces of links per unit mass, one column a node"
+        )
         return found
 
     @property

@@ -129,7 +129,8 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
     for field in dict.fromkeys([*stated, *part.adjustable]):
         called = CALLED.get(field, field)
         documented_as = field if field in entries else called
-        unit = entries[documented_as].unit if documented_as in entries else ""
+        own = getattr(part, "units_of_numbers", {})
+        unit = entries[documented_as].unit if documented_as in entries else own.get(field, "")
         value = getattr(part, field)
         if isinstance(value, Boundary):
             # An end of a body that carries wheels is one of the body alone, and the wheels.

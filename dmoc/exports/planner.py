@@ -265,7 +265,6 @@ def _solver_terms(planner: Planner) -> dict[str, Term]:
         "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
         "largest_residual_torque": Term("N m", "largest defect of the discrete equations of the turn"),
         "largest_residual_wheels": Term("N m", "largest defect of the discrete equations of wheels"),
-        "largest_residual_links": Term("m", "largest gap of a link"),
         "largest_residual_norm": Term("-", "largest |q.q - 1| of the quaternions"),
         "largest_turn": Term("rad", "largest turn between neighbouring nodes; from pi/2 on the plan is wrong"),
         "violation": Term(

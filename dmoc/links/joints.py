@@ -36,7 +36,7 @@ class Spherical(Joint):
         return self.spin(at)
 
     def off(self, at: Mapping[str, Body], value: Any) -> Any:
-        return 2 * columns_of(ca.DM(value)).T @ self.turn(at)
+        return 2 * columns_of(ca.vertcat(value) if isinstance(value, ca.SX) else ca.DM(value)).T @ self.turn(at)
 
     def driven(self, configuration: Any, q: Any, at: Mapping[str, Body], u: Any) -> Any:
         return self._twisted(configuration, q, at, u)

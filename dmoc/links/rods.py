@@ -74,9 +74,9 @@ class Rod(Holonomic):
         """What its angle and its motor are called: by the body at its end."""
         return self.on
 
-    def from_rest(self, at: Mapping[str, Body], rest: float) -> Any:
+    def from_rest(self, at: Mapping[str, Body], rest: Any) -> Any:
         """The angle from a direction in the plane [rad], less than 180 degrees to either side."""
-        arm, x, y = self.arm(at), np.cos(rest), np.sin(rest)
+        arm, x, y = self.arm(at), ca.cos(rest), ca.sin(rest)
         return ca.atan2(arm[1] * x - arm[0] * y, arm[0] * x + arm[1] * y)
 
     def off(self, at: Mapping[str, Body], value: Any) -> Any:

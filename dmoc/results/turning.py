@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
 from dmoc.configurations.coordinates import ATTITUDE, PLACE, WHEELS, Block, Coordinates
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.results.netcdf import Table, as_array
 
 # The variables of each kind of block: its coordinates along the path, its velocities at the start and the goal.
@@ -17,6 +18,14 @@ NAMES = {
     WHEELS: ("wheel_integral", "start_wheel_momentum", "goal_wheel_momentum"),
     ATTITUDE: ("attitude", "start_rate", "goal_rate"),
 }
+
+
+def _reaction_unit(solution: Any) -> str:
+    """One unit for all constraint forces, or one each where they differ."""
+    if solution.problem is None:
+        return "m2/s2 of quaternions and angles, m/s2 of lengths"
+    units = [unit.replace("^", "") for unit in configuration_of(solution.problem).reaction_units]
+    return units[0] if len(set(units)) == 1 else ", ".join(units)
 
 
 def turning_variables(solution: Any, at: str, between: str) -> dict[str, tuple]:
@@ -28,7 +37,7 @@ def turning_variables(solution: Any, at: str, between: str) -> dict[str, tuple]:
     words = "constraint force per unit mass"
     held: dict[str, tuple] = {}
     if path.reaction is not None:
-        held["reaction"] = (("node", "constraint"), path.reaction, "m2/s2" if made.turns else "m/s2", words)
+        held["reaction"] = (("node", "constraint"), path.reaction, _reaction_unit(solution), words)
     if not made.turns:
         return held
     ends = {"start": path.start_velocity, "goal": path.goal_velocity}

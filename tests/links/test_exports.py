@@ -1,5 +1,7 @@
 """Functions of bodies on links, taken away and used without the package's own solve."""
 
+import json
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -78,6 +80,15 @@ def test_bodies_on_joints_leave_the_package_as_they_are_solved(tmp_path):
     assert float(plan["objective"]) == pytest.approx(found.objective, rel=1e-9)
     np.testing.assert_allclose(plan["positions"].full().T, found.position, atol=1e-9)
     np.testing.assert_allclose(plan["attitudes"].full().T, found.attitude, atol=1e-9)
+    # Where the joints are at the goal is an argument.
+    other = load_problem("arm_in_space").make(shoulder_angle=0.7, elbow_angle=-1.0)
+    changed = given | {"goal_upper_value": 0.7, "goal_fore_value": -1.0}
+    wanted = solve(other, order=4, steps=20).objective
+    assert float(take["solver"].call(changed)["objective"]) == pytest.approx(wanted, rel=1e-8)
+    manifest = json.loads((tmp_path / "functions/manifest.json").read_text())["functions"]["solver"]
+    told = {one["name"]: one["unit"] for one in manifest["inputs"] + manifest["outputs"]}
+    assert (told["goal_fore_value"], told["goal_fore_rate"]) == ("rad", "rad/s")
+    assert (told["largest_residual_links"], told["reactions"]) == ("m, rad", "m^2/s^2, m/s^2")
     norms = plan["residual_norm"].full()
     assert norms.shape == (3, 41) and float(plan["largest_residual_norm"]) == np.abs(norms).max() < 1e-12
     # The forearm turns further from node to node than the direction of any link.

@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+import xarray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -534,3 +535,14 @@ def test_rods_in_the_plane_start_by_their_angles_too():
 
 def test_the_room_stands_still():
     assert not np.any([room(2).position, room(2).velocity, room(2).rate])
+
+
+def test_result_files_tell_the_unit_of_each_constraint_force(tmp_path):
+    """Of quaternions and of angles that a joint keeps they are torques per unit mass, of lengths forces."""
+    problem = arm()
+    solve(problem, order=2, steps=20).save(tmp_path / "arm.nc")
+    with xarray.open_dataset(tmp_path / "arm.nc") as table:
+        units = table["reaction"].attrs["units"].split(", ")
+    hinge = ["m/s2"] * 3 + ["m2/s2"] * 2
+    assert units == ["m2/s2"] * 2 + 2 * hinge
+    assert list(configuration_of(problem).link_units) == [("m", "m", "m", "rad", "rad")] * 2
