@@ -96,6 +96,16 @@ class Each(Boundary):
         states = tuple(one if name in self.led else one.oriented(begin) for name, one, begin in pairs)
         return Each(self.names, states, self.joints, self.led)
 
+    def led_to(self, q: np.ndarray) -> Each:
+        """The same with the signs of the quaternions to which a path leads that ends at some coordinates."""
+        states = []
+        for name, state in zip(self.names, self.states, strict=True):
+            mine = q[self._made.of_body(name)[0]][self.dimension :]
+            # NaN, where the attitude is free, is not less than 0.
+            along = state.turns_body and float(mine @ state.fixed()[0][self.dimension :]) < 0
+            states.append(state.the_other_way() if along else state)
+        return Each(self.names, tuple(states), self.joints, self.led)
+
     def fixed(self) -> tuple[np.ndarray, np.ndarray]:
         known = [state.fixed() for state in self.states]
         return self._stacked([q for q, _ in known], 0), self._stacked([v for _, v in known], 1)

@@ -91,6 +91,11 @@ def starting_guess(
         seen = guess.place_of(zone)
         if (bend := zone.off_centre(seen, fractions) - seen).any():
             guess = bent(problem, guess, zone, bend)
+    if problem.links:
+        # What links carry is loaded for problems with links alone.
+        from dmoc.links.load import resting_load
+
+        guess = replace(guess, reaction=resting_load(problem, guess))
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 

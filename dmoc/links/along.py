@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 from typing import Any
 
 import casadi as ca
@@ -43,13 +45,16 @@ def guess_along(problem: Any, fractions: np.ndarray) -> tuple[np.ndarray, tuple[
     return path, (np.nan_to_num(first), np.nan_to_num(last))
 
 
-def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.ndarray) -> np.ndarray:
+def along_links(
+    problem: Any, body: Configuration, ends: tuple, fractions: np.ndarray, round_by: Sequence[Any] = ()
+) -> np.ndarray:
     """Coordinates at fractions of the way between two ends that keep to the links, shape (count, size).
 
     The ends are those of start and goal, and values for entries of the goal that are free, which are NaN.
 
     Rods turn evenly from their first to their last direction, the other bodies go straight. Where links know
-    no such way, the path goes on from place to place towards the goal as far as they let it.
+    no such way, the path goes on from place to place towards the goal as far as they let it. Links in
+    `round_by` lead what they carry the other way round.
     """
     start, goal, likely = ends
     if not body.conditions:
@@ -65,7 +70,7 @@ def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.nd
         carried = {name for link in waiting for name in link.holds[-1:]}
         link = next((one for one in waiting if not carried & set(one.holds[:-1])), waiting[0])
         waiting.remove(link)
-        led = link.led(at, fractions)
+        led = link.led(at, fractions, link in round_by)
         knows |= led is not None
         at |= led or {}
     # A rail is straight: what goes straight keeps to it.
@@ -73,6 +78,30 @@ def along_links(problem: Any, body: Configuration, ends: tuple, fractions: np.nd
     if not knows and np.abs(on.gaps(straight)).max() > BENT * float(np.linalg.norm(aim - start)):
         path = _step_by_step(on, start, aim, fractions)
     return np.array([on.put(place) for place in path])
+
+
+def other_ways(problem: Any, fractions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Names and paths on which hinges, rods and rigid bodies come to their goal the other way round.
+
+    Each by itself, then two at a time.
+    """
+    body, (start, _), (goal, _) = configuration_of(problem), problem.start.fixed(), problem.goal.fixed()
+    likely = problem.goal.likely(problem.start) if problem.system is not None else start
+    made = body.coordinates
+    straight = along_links(problem, body, (start, goal, likely), fractions)
+    carried = {link.holds[-1] for link in problem.links}
+    turning = [block.body for block in made.blocks if block.kind == ATTITUDE and block.body not in carried]
+    loose = [name for name in turning if not np.isnan(goal[made.quaternion_of(name)]).any()]
+    ways: list[Any] = [*(link for link in problem.links if link.goes_round), *loose]
+    for chosen in (*combinations(ways, 1), *combinations(ways, 2)):
+        flipped = goal.copy()
+        for name in set(chosen) & set(loose):
+            flipped[made.quaternion_of(name)] *= -1
+        path = along_links(problem, body, (start, flipped, likely), fractions, chosen)
+        # Where nothing turns there is no other way.
+        if np.abs(path - straight).max() > BENT * max(1.0, np.abs(straight).max()):
+            names = " and ".join(one if isinstance(one, str) else one.holds[-1] or "the rod" for one in chosen)
+            yield f"the other way round of {names}", path
 
 
 def kept_on_links(problem: Any, path: np.ndarray, held: str) -> np.ndarray:

@@ -55,8 +55,15 @@ class Holonomic(Part, ABC):
         """The names of the bodies that it holds; an only body has an empty name."""
         return (getattr(self, "on", ""),)
 
-    def led(self, at: dict[str, Body], fractions: np.ndarray) -> dict[str, Body] | None:
-        """The body that it carries, by its name, led from its first to its last state.
+    # Whether what it carries may come to one place by two ways round.
+    @property
+    def goes_round(self) -> bool:
+        return False
+
+    def led(
+        self, at: dict[str, Body], fractions: np.ndarray, other_way: bool = False
+    ) -> dict[str, Body] | None:
+        """The body that it carries, by its name, led from its first to its last state, or the other way round.
 
         The states `at` are arrays of one row a time: a straight line, or as other links have led them. None
         where the link knows no way.

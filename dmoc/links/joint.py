@@ -156,11 +156,18 @@ class Joint(Holonomic):
         """Its coordinate on the way from one value to another."""
         return first + fractions[:, None] * (last - first)
 
-    def led(self, at: dict[str, Body], fractions: np.ndarray) -> dict[str, Body] | None:
+    @property
+    def goes_round(self) -> bool:
+        return self.coordinates == 1 and self.coordinate_units[0] == "rad"
+
+    def led(
+        self, at: dict[str, Body], fractions: np.ndarray, other_way: bool = False
+    ) -> dict[str, Body] | None:
         body = at[self.on]
         base = at[self.to] if self.to else room(len(fractions))
         values = self.measured(base, body)
-        way = self.between(values[0], values[-1], fractions)
+        last = values[-1] - other_way * 2 * np.pi * np.sign(values[-1] - values[0])
+        way = self.between(values[0], last, fractions)
         return {self.on: self.posed(base, way, np.zeros((len(way), self.motors)))}
 
     def lines(self, at: dict[str, Body]) -> list[np.ndarray]:

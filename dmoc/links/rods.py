@@ -114,10 +114,16 @@ class Rod(Holonomic):
         shape = np.shape(at[self.on].position)
         return at[self.anchor].position if isinstance(self.anchor, str) else np.broadcast_to(self.anchor, shape)
 
-    def led(self, at: dict[str, Body], fractions: np.ndarray) -> dict[str, Body] | None:
+    @property
+    def goes_round(self) -> bool:
+        return True
+
+    def led(
+        self, at: dict[str, Body], fractions: np.ndarray, other_way: bool = False
+    ) -> dict[str, Body] | None:
         body, foot = at[self.on], self._foot(at)
         first, last = (body.position[i] - foot[i] for i in (0, -1))
-        return {self.on: body._replace(position=foot + turned_evenly(first, last, fractions))}
+        return {self.on: body._replace(position=foot + turned_evenly(first, last, fractions, other_way))}
 
     def lines(self, at: dict[str, Body]) -> list[np.ndarray]:
         return [np.stack([self._foot(at), at[self.on].position], axis=1)]
@@ -206,7 +212,9 @@ class Surface(Holonomic):
         return f"{self.on or 'the body'} on a surface"
 
 
-def turned_evenly(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+def turned_evenly(
+    first: np.ndarray, last: np.ndarray, fractions: np.ndarray, other_way: bool = False
+) -> np.ndarray:
     """An arm that turns evenly from one direction to another by the shorter way, shape (count, dimension)."""
     length = float(np.linalg.norm(first))
     one = first / length
@@ -217,7 +225,7 @@ def turned_evenly(first: np.ndarray, last: np.ndarray, fractions: np.ndarray) ->
         aside = np.eye(len(one))[np.argmin(np.abs(one))]
         across = np.array([-one[1], one[0]]) if len(one) == 2 else aside - (one @ aside) * one
     across = across / np.linalg.norm(across)
-    angle = np.arccos(along) * fractions[:, None]
+    angle = (np.arccos(along) - 2 * np.pi * other_way) * fractions[:, None]
     return length * (np.cos(angle) * one + np.sin(angle) * across)
 
 

@@ -263,8 +263,10 @@ def with_as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:
 def followed(problem: TransferProblem, given: Any) -> TransferProblem:
     """The problem whose goal has the sign of its quaternion to which a former path leads."""
     path = getattr(given, "path", given)
-    if problem.inertia is None or not isinstance(path, DiscretePath) or not path.attitudes:
+    if not isinstance(path, DiscretePath) or not path.attitudes:
         return problem
+    if problem.system is not None:
+        return replace(problem, goal=problem.goal.led_to(path.position[-1]))
     ends = (problem.start.fixed()[0][-4:], problem.goal.fixed()[0][-4:])
     signs = [np.sign(path.attitudes[0][place] @ end) for place, end in zip((0, -1), ends, strict=True)]
     # NaN, where an end leaves its attitude open, is not less than 0.

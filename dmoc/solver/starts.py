@@ -71,9 +71,10 @@ def local_optima(
 ) -> list[Optimum]:
     """The distinct optima that `starts` guesses lead to, the best first.
 
-    The guesses are the default one, then for a body that turns the turn the other way round, with a lone
-    attractor more and fewer revolutions, with keep-out zones paths that bend around each on either side, then
-    random bends. The same numbers are drawn every time.
+    The guesses are the default one, then for a body that turns the turn the other way round, on links each
+    hinge and rod the other way round and two of them at a time, with a lone attractor more and fewer
+    revolutions, with keep-out zones paths that bend around each on either side, then random bends. The same
+    numbers are drawn every time.
     """
     base = first_path(problem, order, None, hold, guess)
     if order or base.order == 2:
@@ -150,6 +151,12 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
     if problem.inertia is not None:
         yield from _turns(problem, base)
         return
+    if problem.links or problem.system is not None:
+        # What leads bodies on links is loaded for those alone.
+        from dmoc.links.along import other_ways
+
+        for name, position in other_ways(problem, base.fractions):
+            yield name, replace(base, position=position)
     lone = problem.attraction.lone
     if lone is not None and problem.dimension > 1:
         center = lone.place(problem.dimension)

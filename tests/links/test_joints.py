@@ -47,6 +47,7 @@ from dmoc.links.along import states_of
 from dmoc.links.joint import room
 from dmoc.motion.momenta import flow_between_links
 from dmoc.scene.problem_file import load_problem
+from dmoc.solver.starts import local_optima
 
 HEAVY, LIGHT = Member("a", 3.0, (1.0, 2.0, 2.8)), Member("b", 2.0, (0.4, 0.5, 0.6))
 WAY, TIME = 1.5, 4.0
@@ -546,3 +547,45 @@ def test_result_files_tell_the_unit_of_each_constraint_force(tmp_path):
     hinge = ["m/s2"] * 3 + ["m2/s2"] * 2
     assert units == ["m2/s2"] * 2 + 2 * hinge
     assert list(configuration_of(problem).link_units) == [("m", "m", "m", "rad", "rad")] * 2
+
+
+def test_starts_bring_a_joint_to_its_goal_the_other_way_round():
+    """The arm of a free-flyer reaches for less where its forearm comes by the other side."""
+    problem = load_problem("arm_in_space").make()
+    optima = local_optima(problem, 4, order=4)
+    named = {start: one for one in optima for start in one.starts}
+    other = named["the other way round of fore"]
+    assert other.objective < 0.6 * named["default"].objective
+    found = solve(problem, guess=other.path)
+    assert found.success and not failed(found)
+    at = states_of(found.path.coordinates, found.path.position)
+    fore = problem.links[1].measured(at["upper"], at["fore"])[:, 0]
+    # From 2.4 rad up to -1.4 rad a whole turn on, in place of down to it.
+    assert fore[0] == pytest.approx(2.4) and np.unwrap(fore)[-1] == pytest.approx(2 * np.pi - 1.4)
+
+
+def test_a_rigid_body_of_a_system_is_sent_the_other_way_round():
+    """Two free bodies: the one that turns by 150 degrees may turn by 210 degrees."""
+    ends = {"a": Pose((0, 0, 0)), "b": Pose((5, 0, 0))}
+    goal = {"a": Pose((0, 0, 0), attitude=rotation((0, 0, 1), 150)), "b": Pose((5, 0, 0))}
+    problem = TransferProblem(
+        System([HEAVY, LIGHT]), ends, goal, TIME, actuator=[On("a", Torque()), On("b", Torque())]
+    )
+    short, long = local_optima(problem, 2, order=4)
+    assert long.starts == ("the other way round of a",)
+    turns = [np.radians(angle) for angle in (150, 210)]
+    wanted = [6 * 2.8**2 * turn**2 / TIME**3 for turn in turns]
+    assert [short.objective, long.objective] == pytest.approx(wanted, rel=1e-4)
+
+
+def test_a_chain_that_hangs_is_solved_from_the_load_that_its_rods_carry():
+    """The default guess knows what the rods hold at rest, and leads to the least effort that is known."""
+    problem = load_problem("hanging_chain").make()
+    start = starting_guess(problem, np.linspace(0, 1, 11), 2, False)
+    # At rest, straight down, the upper rod carries three masses, the others two and one.
+    pull = 9.81 * np.array([3.0, 2.0, 1.0]) / 3.0
+    np.testing.assert_allclose(start.reaction[0], pull, rtol=1e-9)
+    free = replace(problem, actuator=replace(problem.actuator, limit=None))
+    for one in (problem, free):
+        found = solve(one)
+        assert found.objective == pytest.approx(7.48577, rel=1e-5) and found.iterations < 60
