@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import Pose as Pose
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
+    from dmoc.films.film import animate as animate
     from dmoc.legs.ends import Free as Free
     from dmoc.legs.ends import Periodic as Periodic
     from dmoc.legs.events import Bounce as Bounce

@@ -8,9 +8,7 @@ from dmoc import JointState, JointTorque, Member, Rod, System, TransferProblem, 
 def problem(links=3, degrees=60.0, duration=4.0, length=0.5, limit=10.0):
     """A chain of points on rods, from straight down to its first rod raised; only that rod is driven.
 
-    The least effort found is 7.4856614 N^2 m^2 s, at order 8 with 100 steps and, to five digits, with
-    `--tol 1e-5`. From the default guess order 4 ends in an optimum beside it, 7.5306 on 100 steps and 7.5417 on
-    400.
+    The least effort found is 7.4856614 N^2 m^2 s, at order 8 with 100 steps and, to five digits, by default.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ LAYERS = [
     ["structure"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
-    ["charts"],
+    ["charts", "films"],
     ["cli"],
 ]
 FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}

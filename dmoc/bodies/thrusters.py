@@ -14,6 +14,7 @@ from dmoc.basics.quaternions import AXES
 from dmoc.bodies.torques import OnBody
 from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.engines import Burner
+from dmoc.parts.outline import Jet
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,10 @@ class Thrusters(OnBody, Burner):
     @property
     def structure(self) -> tuple:
         return type(self), self.burns, self.positions, self.directions
+
+    def jets(self) -> list[Jet]:
+        pairs = zip(self.positions, self.directions, strict=True)
+        return [Jet(tuple(place), tuple(way), i) for i, (place, way) in enumerate(pairs)]
 
     def size(self, dimension: int) -> int:
         return len(self.directions)

@@ -198,7 +198,7 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def writable(path: Path | None, drawn: bool = False, table: bool = False) -> None:
+def writable(path: Path | None, drawn: bool = False, table: bool = False, moving: bool = False) -> None:
     """ValueError unless a file can be written there: said before the work, not after it.
 
     A result takes the place of another one, never that of a problem file or a thesis.
@@ -218,6 +218,10 @@ def writable(path: Path | None, drawn: bool = False, table: bool = False) -> Non
 
         if path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+    elif moving:
+        from dmoc.films.film import check_target
+
+        check_target(path)
     elif table:
         if path.suffix.lower() != ".csv":
             raise ValueError(f"cannot write a table into {path}: the file must end in .csv")

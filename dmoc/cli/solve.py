@@ -40,6 +40,7 @@ def solve(
     settings: Settings = None,
     out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    animate: Annotated[Path | None, typer.Option(help="Write a moving picture here (gif or mp4).")] = None,
     guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
     starts: Annotated[
         int,
@@ -63,6 +64,7 @@ def solve(
 
     writable(out)
     writable(plot, drawn=True)
+    writable(animate, moving=True)
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         file, problem = problem_of(name, settings)
@@ -82,4 +84,6 @@ def solve(
         from dmoc.plots.page import save_figure
 
         save_figure(solution, plot, verdict)
-    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot) if path is not None])
+    if animate is not None:
+        dmoc.animate(solution, animate)
+    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot, animate) if path is not None])

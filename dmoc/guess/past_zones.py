@@ -73,3 +73,17 @@ def _past_the_others(
         worth = [-float(np.abs(bend).max()) if nearer else float((bend * aside).sum()) for bend in ways]
         path = bent(problem, path, deepest, ways[int(np.argmax(worth))])
     return path, False
+
+
+def off_centres(problem: TransferProblem, guess: DiscretePath) -> DiscretePath:
+    """A guess moved off the middle of zones, with what links carry along it."""
+    for zone in problem.constraints:
+        seen = guess.place_of(zone)
+        if (bend := zone.off_centre(seen, guess.fractions) - seen).any():
+            guess = bent(problem, guess, zone, bend)
+    if not problem.links:
+        return guess
+    # What links carry is loaded for problems with links alone.
+    from dmoc.guess.turning import resting_load
+
+    return replace(guess, reaction=resting_load(problem, guess))

@@ -14,7 +14,7 @@ from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.open_ends import end_estimates, spiral_between
-from dmoc.guess.past_zones import bent
+from dmoc.guess.past_zones import off_centres
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -87,15 +87,7 @@ def starting_guess(
         position[place, known] = end.fixed()[0][known]
     mass = np.full(len(fractions), problem.mass)
     guess = replace(DiscretePath(mesh, order, hold, duration, position, control, mass, *ends), made_of=made_of)
-    for zone in problem.constraints:
-        seen = guess.place_of(zone)
-        if (bend := zone.off_centre(seen, fractions) - seen).any():
-            guess = bent(problem, guess, zone, bend)
-    if problem.links:
-        # What links carry is loaded for problems with links alone.
-        from dmoc.links.load import resting_load
-
-        guess = replace(guess, reaction=resting_load(problem, guess))
+    guess = off_centres(problem, guess)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
 
 

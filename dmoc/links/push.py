@@ -14,6 +14,7 @@ from dmoc.basics.digits import up
 from dmoc.links.joints import Prismatic, Revolute, Spherical
 from dmoc.links.rods import Rod
 from dmoc.parts.actuator import Actuator
+from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
 
 
@@ -174,7 +175,7 @@ class On(Actuator):
     def __post_init__(self) -> None:
         of_kind("On: body", self.body, str)
         of_kind("On: push", self.push, Actuator)
-        if self.push.burns or self.push.throttle(ca.SX.sym("u", 8)) is not None:
+        if self.push.burns:
             raise ValueError(
                 f"On: {type(self.push).__name__} burns propellant; bodies of a system keep their masses"
             )
@@ -223,6 +224,9 @@ class On(Actuator):
 
     def units(self, dimension: int) -> tuple[str, ...]:
         return self.push.units(len(self._axes(dimension)))
+
+    def jets(self) -> list[Jet]:
+        return [replace(jet, body=self.body) for jet in self.push.jets()]
 
     def effort(self, u: Any) -> Any:
         return self.push.effort(u)

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, of_kind
 from dmoc.parts.actuator import Actuator
+from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
 
 
@@ -70,6 +71,11 @@ class Several(Actuator):
         axes = next(axes for axes in (2, 3, 1) if self.size(axes) == count)
         columns = [u[:, at] if isinstance(u, np.ndarray) else u[at] for at in self._places(axes)]
         return list(zip(self.parts, columns, strict=True))
+
+    def jets(self) -> list[Jet]:
+        # Thrusters are on bodies in space.
+        pairs = zip(self.parts, self._places(3), strict=True)
+        return [replace(jet, control=at.start + jet.control) for part, at in pairs for jet in part.jets()]
 
     def effort(self, u: Any) -> Any:
         return sum(part.effort(mine) for part, mine in self._known(u))

@@ -11,6 +11,7 @@ import numpy as np
 from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
 from dmoc.parts.constraint import Constraint
+from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
 
 
@@ -125,6 +126,10 @@ class Actuator(ABC):
         """The column of the size of q by which it acts on a configuration [N], [N m]."""
         force, torque = self.wrench(configuration.rotation(q), u)
         return configuration.generalised(q, force, torque, self.spun(u))
+
+    def jets(self) -> list[Jet]:
+        """The thrusters that it fires, as pictures show them; none by default."""
+        return []
 
     def spun(self, u: Any) -> Any:
         """Torques on the reaction wheels [N m]; None where there are none."""

@@ -34,3 +34,13 @@ class Cone:
 
 # A constraint can answer `outline` with these shapes, which pictures know how to draw.
 Shape = Ball | Box | Cone
+
+
+@dataclass(frozen=True)
+class Jet:
+    """A thruster on a body of a system: place [m] and direction of its force in body axes, and its control."""
+
+    place: tuple[float, ...]
+    direction: tuple[float, ...]
+    control: int
+    body: str = ""

@@ -1,0 +1,153 @@
+"""A moving picture of a solution: bodies, links, body axes and what pushes, as time goes by."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import of_kind, short
+from dmoc.basics.files import as_path, whole_file
+from dmoc.films.frames import Scene, scene_of
+from dmoc.plots.style import AXIS_COLOURS, CHANNEL_COLOURS, DARK, PALE, PUSH, SETTINGS, readable
+from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.results.solution import Solution
+
+# A film can be written in these formats, which the end of the file's name decides.
+SUFFIXES = (".gif", ".mp4")
+# A film has at most so many frames, and so many a second: writing takes seconds, and a file a few megabytes.
+MOST_FRAMES, RATE = 200, 20
+# A film is so large [inches], of so many dots an inch.
+SIZE, DOTS = (7.2, 5.6), 90
+
+
+def animate(solution: Solution, path: str | os.PathLike, frames: int = 80) -> None:
+    """Write a moving picture of a solution, whole or not at all.
+
+    Parameters
+    ----------
+    solution : Solution
+    path : path
+        Ends in .gif or, where ffmpeg is on the computer, in .mp4.
+    frames : int
+        Number of frames at even times, 2 to 200; 20 of them are shown a second.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
+    """
+    of_kind("solution", solution, Solution)
+    check_target(path)
+    if type(frames) is not int or not 2 <= frames <= MOST_FRAMES:
+        raise ValueError(f"frames must be a whole number from 2 to {MOST_FRAMES}; got {short(frames)}")
+    if not np.isfinite(solution.path.position).all():
+        raise ValueError("the path is not finite, so there is nothing to show")
+    import matplotlib
+    from matplotlib import animation
+    from matplotlib.figure import Figure
+
+    scene = scene_of(solution, frames)
+    with matplotlib.rc_context(SETTINGS), whole_file(path) as temporary:
+        page = Figure(figsize=SIZE)
+        film = _Film(page, solution, scene)
+        moving = as_path(path).suffix.lower() == ".mp4"
+        writer: Any = animation.FFMpegWriter(fps=RATE) if moving else animation.PillowWriter(fps=RATE)
+        with writer.saving(page, str(temporary), DOTS):
+            for frame in range(frames):
+                film.show(frame)
+                writer.grab_frame()
+
+
+def check_target(path: str | os.PathLike) -> None:
+    """ValueError unless a film can be written into such a file."""
+    suffix = as_path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"cannot write a film into {path}: the file must end in {' or '.join(SUFFIXES)}")
+    if suffix == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise ValueError(f"cannot write {path}: ffmpeg is not on this computer; install it, or use .gif")
+
+
+class _Film:
+    """A panel of which some lines move from frame to frame."""
+
+    def __init__(self, page: Any, solution: Solution, scene: Scene):
+        self.scene, space = scene, scene.axes == 3
+        self.size, unit = readable(np.ptp(scene.everything, axis=0), "m")
+        self.late, self.late_unit = readable(scene.times, "s")
+        self.axes = page.add_subplot(projection="3d" if space else None)
+        self._surround(solution, space)
+        for i, name in enumerate("xyz"[: scene.axes]):
+            pad = 10 if space else None
+            label = f"{name} [{unit}]" if solution.dimension > i else ("" if solution.dimension else name)
+            getattr(self.axes, f"set_{name}label")(label, labelpad=pad)
+        if solution.dimension == 1:
+            self.axes.set_yticks([])
+        self.ahead = [self._line(path, color=PALE, linewidth=1.2) for path in scene.places]
+        look: dict[str, Any] = {"linewidth": 2.0}
+        colours = [CHANNEL_COLOURS[i % len(CHANNEL_COLOURS)] for i in range(len(scene.places))]
+        self.behind = [self._line(p[:1], color=c, **look) for p, c in zip(scene.places, colours, strict=True)]
+        self.links = [self._line(line[0], color=DARK, linewidth=2.2) for line in scene.links]
+        self.triads = [
+            self._line(arm[0], color=AXIS_COLOURS[i % 3], linewidth=2.0) for i, arm in enumerate(scene.triads)
+        ]
+        self.pushes = [self._line(push[0], color=PUSH, linewidth=2.6) for push in scene.pushes]
+        dot: dict[str, Any] = {"marker": "o", "markersize": 8, "linestyle": "none"}
+        self.bodies = [self._line(p[:1], color=c, **dot) for p, c in zip(scene.places, colours, strict=True)]
+        named = [(line, name) for line, name in zip(self.bodies, scene.names, strict=True) if name]
+        if self.pushes:
+            named.append((self.pushes[0], scene.push_words))
+        if named:
+            page.legend(*zip(*named, strict=True), loc="lower center", ncol=6)
+        if not space:
+            page.subplots_adjust(bottom=0.17)
+
+    def _surround(self, solution: Solution, space: bool) -> None:
+        """Zones and attractors, and a view that holds all that moves."""
+        from matplotlib.ticker import MaxNLocator
+
+        low, high = self.scene.everything.min(axis=0), self.scene.everything.max(axis=0)
+        margin = 0.06 * float((high - low).max() or 1.0)
+        low, high = low - margin, high + margin
+        if solution.dimension == self.scene.axes:
+            scenery = view_of(solution, self.scene.everything)
+            low, high = np.minimum(low, scenery[0]), np.maximum(high, scenery[1])
+        if space:
+            middle, side = 0.5 * (low + high), np.maximum(high - low, 0.2 * (high - low).max())
+            low, high = middle - side / 2, middle + side / 2
+            self.axes.set_box_aspect(side)
+            self.axes.computed_zorder = False
+        else:
+            self.axes.set_aspect("equal")
+        view = low / self.size, high / self.size
+        if solution.dimension == self.scene.axes:
+            draw_scene(self.axes, solution, view, self.size)
+        span = view[1] - view[0]
+        for i, name in enumerate("xyz"[: self.scene.axes]):
+            self.axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
+            axis = getattr(self.axes, f"{name}axis")
+            # A short side has room for few numbers, and plain ones are drawn five times as fast.
+            axis.set_major_locator(MaxNLocator(2 + round(4 * span[i] / span.max())))
+            axis.set_major_formatter("{x:g}")
+
+    def _line(self, points: np.ndarray, **look: Any) -> Any:
+        return self.axes.plot(*points.T / self.size, zorder=5, **look)[0]
+
+    def _move(self, line: Any, points: np.ndarray) -> None:
+        (line.set_data_3d if self.scene.axes == 3 else line.set_data)(*points.T / self.size)
+
+    def show(self, frame: int) -> None:
+        """Move all lines to a frame."""
+        scene = self.scene
+        for path, line, dot in zip(scene.places, self.behind, self.bodies, strict=True):
+            self._move(line, path[: frame + 1])
+            self._move(dot, path[frame : frame + 1])
+        moving = ((self.links, scene.links), (self.triads, scene.triads), (self.pushes, scene.pushes))
+        for lines, points in moving:
+            for line, known in zip(lines, points, strict=True):
+                self._move(line, known[min(frame, len(known) - 1)])
+        self.axes.set_title(f"t = {scene.times[frame] / self.late:.2f} {self.late_unit}", loc="left")
