@@ -6,6 +6,9 @@ from dmoc import JointTorque, Member, Rod, State, System, TransferProblem, Unifo
 def problem(duration=8.0, limit=None):
     """Masses of 1 kg at the ends of rods of 1 m; gravity is 1 m/s^2.
 
+    There are many swings: from the default guess the effort is 7.1991 N^2 m^2 s, and `--starts 4` finds one of
+    1.79547.
+
     Parameters
     ----------
     duration : float
