@@ -1,4 +1,4 @@
-"""A cubic spline, motion with an error estimate, a root: importing SciPy takes longer than a small solve."""
+"""A cubic spline, motion with an error estimate, a root, the chain rule: importing SciPy takes longer."""
 
 from __future__ import annotations
 
@@ -126,3 +126,17 @@ def root(function: Callable[[float], float], a: float, b: float, tol: float) -> 
         a, at_a = (b, at_b) if at_b * at_c < 0 else (a, 0.5 * at_a)
         b, at_b = c, at_c
     return b
+
+
+def chained(rows: ca.SX, total: ca.SX, z: ca.SX, y: ca.SX, known: ca.SX) -> list[ca.SX]:
+    """Jacobian of rows, upper triangle of the Hessian of the total, and its slope, in z where y is known(z)."""
+    moves, both = ca.jacobian(known, z), ca.vertcat(z, y)
+    second, first = ca.hessian(total, both)
+    n = z.numel()
+    mixed, lam = second[:n, n:] @ moves, ca.SX.sym("lam", y.numel())
+    bent = ca.substitute(ca.hessian(ca.dot(lam, known), z)[0], lam, first[n:])
+    jacobian = ca.jacobian(rows, z) + ca.jacobian(rows, y) @ moves
+    hessian = second[:n, :n] + mixed + mixed.T + moves.T @ (second[n:, n:] @ moves) + bent
+    slope = first[:n] + moves.T @ first[n:]
+    parts = ca.substitute([jacobian, ca.triu(hessian), slope], [y], [known])
+    return [ca.sparsify(part) for part in ca.cse(parts)]

@@ -52,6 +52,7 @@ def step_momenta(
     push: Sequence,
     body: Configuration | None = None,
     origin: Any = 0,
+    v: Sequence | None = None,
 ) -> list:
     """P_0 .. P_s of one step [m/s].
 
@@ -71,8 +72,10 @@ def step_momenta(
         A point mass if not given.
     origin : column
         Where the positions count from.
+    v : list of columns, optional
+        The velocities of the step, if they are known; `step_velocities` if not given.
     """
-    v = step_velocities(scheme, h, q)
+    v = step_velocities(scheme, h, q) if v is None else v
     at = [point(t0 + c * h, *state) for c, state in zip(scheme.points, zip(q, v, m, strict=True), strict=True)]
     acted = [h * w * (dldq + f + u) for w, (dldq, _, f), u in zip(scheme.weights, at, push, strict=True)]
     if body is not None and not kinetic_at_nodes(body, scheme.degree):

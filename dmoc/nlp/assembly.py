@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.compiled import compiled
+from dmoc.basics.numerics import chained
 
 # Sums of at most this many entries are made by picking one entry after the other; the rest of a longer one, as
 # for a free duration that is in every step, is added up at once.
@@ -58,15 +59,30 @@ class Kernel:
         return compiled(self.functions)
 
 
-def kernel(name: str, variables: ca.SX, data: ca.SX, parameters: ca.SX, rows: ca.SX, cost: ca.SX) -> Kernel:
+def kernel(
+    name: str,
+    variables: ca.SX,
+    data: ca.SX,
+    parameters: ca.SX,
+    rows: ca.SX,
+    cost: ca.SX,
+    between: tuple[ca.SX, ca.SX] | None = None,
+) -> Kernel:
     """The kernel of rows (a column) and a cost (a scalar).
 
     They are expressions of local unknowns z, numbers d that differ between evaluations and the
-    parameters p of the NLP, each a column of symbols.
+    parameters p of the NLP, each a column of symbols. `between` are symbols in them and the expressions of z, d
+    and p that these stand for: derivatives are made by the chain rule in them, which takes fewer instructions
+    where rows depend on few of them at a time.
     """
     multipliers, weight = ca.SX.sym("lam", rows.numel()), ca.SX.sym("sigma")
-    hessian, slope = ca.hessian(weight * cost + ca.dot(multipliers, rows), variables)
-    jacobian, hessian = ca.jacobian(rows, variables), ca.triu(hessian)
+    total = weight * cost + ca.dot(multipliers, rows)
+    if between is None:
+        hessian, slope = ca.hessian(total, variables)
+        jacobian, hessian = ca.jacobian(rows, variables), ca.triu(hessian)
+    else:
+        jacobian, hessian, slope = chained(rows, total, variables, *between)
+        rows, cost = ca.substitute([rows, cost], [between[0]], [between[1]])
     outputs = {
         "rows": ca.densify(rows),
         "cost": ca.densify(cost),

@@ -31,6 +31,7 @@ class Draft:
         self._rows: list[ca.SX] = []
         self._targets: list[tuple[str, slice]] = []
         self._limits: list[Limit] = []
+        self._between: tuple[ca.SX, ca.SX] | None = None
 
     def _once(self, group: str) -> ca.SX:
         """The symbol of a single unknown, however often it is asked for."""
@@ -81,6 +82,12 @@ class Draft:
         """The duration: an unknown if it is free, a parameter if not."""
         return self.take("duration", 1) if self.writer.problem.free_duration else self.writer.duration
 
+    def between(self, known: list) -> list:
+        """Symbols that stand for some columns in the rows: see `kernel`."""
+        symbols = [ca.SX.sym(f"between_{i}", column.numel()) for i, column in enumerate(known)]
+        self._between = ca.vertcat(*symbols), ca.vertcat(*known)
+        return symbols
+
     def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:
         """Add to rows of a group that others also add to."""
         self._rows.append(rows)
@@ -96,6 +103,6 @@ class Draft:
 
     def stencil(self, every: str) -> Stencil:
         given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.writer.parameters
-        made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost))
+        made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost), self._between)
         places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)
         return Stencil(made, every, *places, tuple(self._limits))

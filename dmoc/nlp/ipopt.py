@@ -100,6 +100,8 @@ def make_solver(
 ) -> ca.Function:
     """The CasADi `nlpsol` Function of an NLP, with its exact derivatives.
 
+    With the user's option "jit" CasADi compiles f and g; the derivatives are compiled likewise.
+
     Raises
     ------
     ValueError
@@ -107,9 +109,13 @@ def make_solver(
     """
     derivatives = {"jac_g": parts.jacobian, "hess_lag": parts.hessian, "grad_f": parts.gradient}
     callback = {} if watch is None else {"iteration_callback": watch}
-    every = ALWAYS | derivatives | settings | callback | (options or {})
     program = {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}
+    given = options or {}
     try:
+        if given.get("jit"):
+            how = {name: value for name, value in given.items() if name.startswith("jit") or name == "compiler"}
+            derivatives = {name: function.wrap_as_needed(how) for name, function in derivatives.items()}
+        every = ALWAYS | derivatives | settings | callback | given
         return ca.nlpsol("solver", "ipopt", program, every)
     except RuntimeError as error:
         if not options:

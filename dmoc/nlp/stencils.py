@@ -125,7 +125,10 @@ class _Writer:
         def point(t, r, v, m):
             return moving(t, r + self.origin, v, m)
 
-        momenta = step_momenta(rule, point, t0, h, r, m, push, body, self.origin)
+        v = step_velocities(rule, h, r)
+        if body.surplus and rule.degree > 1:
+            v = draft.between(v)
+        momenta = step_momenta(rule, point, t0, h, r, m, push, body, self.origin, v)
         for momentum, frame, at in zip(momenta, frames, nodes, strict=True):
             draft.add("dynamics", frame.T @ momentum, at)
         moves = [position - r[0] for position in r[1:]]
@@ -142,7 +145,6 @@ class _Writer:
         if problem.actuator.burns:
             self._burn(draft, h, m, [self.actuator.flow(control) for control in u])
         if self._cost_in_steps():
-            v = step_velocities(rule, h, r)
             if self.hold:
                 v[0], v[-1] = self._end_velocities(t0, h, r, m, push)
             rates = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import least_extent, path_scales
+from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
 from dmoc.results.flown_cost import cost_functions
 from dmoc.scene.problem import TransferProblem
 
@@ -93,8 +93,9 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     scales = path_scales(guess)
     moment, fastest = problem.moment, max(scales.turn / guess.duration, scales.rate)
     typical = moment * fastest / guess.duration
-    if problem.links:
-        # What links hold up pulls on levers, also where nothing turns.
+    if problem.links or fastest * guess.duration <= LEAST_TURN:
+        # What links hold up pulls on levers, also where nothing turns. In the attitude of a body that does not
+        # turn are the errors of the optimiser alone, which must not be made large.
         typical = max(typical, without)
     limit = problem.actuator.torque_limit()
     if limit is not None:

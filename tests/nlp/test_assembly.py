@@ -21,14 +21,17 @@ from dmoc import (
     Nozzles,
     Objective,
     PointGravity,
+    Pose,
     RotatingFrame,
     Row,
     SpeedLimit,
     Spring,
     State,
+    Thrusters,
     Time,
     TransferProblem,
     UniformGravity,
+    rotation,
     transcribe,
 )
 from dmoc.guess.starting import starting_guess
@@ -87,6 +90,14 @@ SCENES = {
         actuator=Engine(3.0, exhaust_velocity=9.0),
         objective=Fuel(),
         duration=(0.5, 4.0),
+    ),
+    "a body, burning, free time": TransferProblem(
+        2.0,
+        Pose((0, 0, 0)),
+        Pose((2, 1, -1), attitude=rotation((0.2, 0.5, -0.8), 80)),
+        (3.0, 9.0),
+        inertia=(1.0, 2.0, 2.8),
+        actuator=Thrusters([(0, 1, 0), (0, 0, 1)], [(1, 0, 0), (0, 1, 0)], 1.0, exhaust_velocity=9.0),
     ),
 }
 
