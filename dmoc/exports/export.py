@@ -91,7 +91,9 @@ def export(
     options : dict, optional
         CasADi `nlpsol` options of both solvers, for example {"ipopt.max_wall_time": 0.5}, or where an
         objective that is 1e-6 of itself too large is good enough {"ipopt.tol": 1e-8}: a warm start of twelve
-        thrusters then takes a quarter less time.
+        thrusters then takes a quarter less time. With {"jit": True, "compiler": "shell"} CasADi compiles all
+        functions of the NLP by gcc whenever a solver is loaded, in seconds; a warm start of twelve thrusters at
+        order 4 with 40 steps then takes 0.65 of the time.
 
     Returns
     -------

@@ -31,6 +31,19 @@ def test_least_time_is_that_of_a_cart():
     assert solve(replace(problem, actuator=Torque(1.0)), steps=60).duration < 0.9 * found.duration
 
 
+@pytest.mark.parametrize("axis, moment", [((1, 0, 0), 1.0), ((0, 0, 1), 2.8)])
+def test_a_slew_about_a_principal_axis_is_in_closed_form_at_order_8(axis, moment):
+    """Least time 2 sqrt(J theta / tau), whose switch is on a step end, and least effort 6 J^2 theta^2 / T^3."""
+    goal, angle, most = Attitude(rotation(axis, 90)), np.pi / 2, 0.5
+    body = {"inertia": (1.0, 2.0, 2.8), "actuator": BallTorque(most), "objective": Time()}
+    found = solve(TransferProblem(1.0, REST, goal, (1.0, 12.0), **body), order=8, steps=16).raise_for_status()
+    assert verify(found).ok
+    assert found.duration == pytest.approx(2 * np.sqrt(moment * angle / most), rel=1e-8)
+    slow = TransferProblem(1.0, REST, goal, 5.0, inertia=(1.0, 2.0, 2.8), actuator=Torque())
+    least = 6 * moment**2 * angle**2 / 5**3
+    assert solve(slow, order=8, steps=16).objective == pytest.approx(least, rel=1e-10)
+
+
 def test_least_impulse_is_that_of_a_cart(tmp_path):
     """It turns at w with w T - w^2 J / tau = theta and spends 2 J w of torque times time."""
     problem = turn(objective=Fuel())

@@ -1,12 +1,15 @@
 """Functions of bodies on links, taken away and used without the package's own solve."""
 
 import json
+import subprocess
+import sys
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from dmoc import export, simulate, solve
+from dmoc.basics.compiled import compiler
 from dmoc.scene.problem_file import load_problem
 
 
@@ -107,3 +110,64 @@ def test_bodies_on_joints_leave_the_package_as_they_are_solved(tmp_path):
     )
     for name, rows in (("position", flight.position), ("attitude", flight.attitude), ("rate", flight.rate)):
         np.testing.assert_allclose(first[f"next_{name}"].full().ravel(), rows[1], atol=1e-12)
+
+
+# Runs where dmoc is not to be had: a library of C code and inputs in, outputs out.
+ALONE = """
+import json, sys
+sys.modules["dmoc"] = None
+import casadi as ca, numpy as np
+for name, file, given in json.load(sys.stdin):
+    found = ca.external(name, file)(**{key: np.array(value) for key, value in given.items()})
+    print(json.dumps({key: np.array(ca.densify(value)).tolist() for key, value in found.items()}))
+"""
+
+
+@pytest.mark.skipif(compiler() is None, reason="needs a C compiler")
+@pytest.mark.parametrize("name", ["arm_in_space", "cart_pole"])
+def test_c_code_of_joints_and_of_rods_gives_the_same_where_there_is_no_dmoc(name, tmp_path):
+    problem, steps = load_problem(name).make(), 20
+    export(problem, tmp_path / "out", order=4, steps=steps)
+    sources, library = tmp_path / "out/c/functions.c", tmp_path / "functions.so"
+    flags = ["-std=c99", "-Wall", "-Werror", "-O0", "-shared", "-fPIC"]
+    subprocess.run([compiler(), *flags, sources, "-lm", "-o", library], check=True)
+    made = {
+        each: ca.Function.load(str(tmp_path / f"out/{each}.casadi")) for each in ("step", "rollout", "residual")
+    }
+    push = 0.1 * np.random.default_rng(4).normal(size=(problem.controls, 2 * steps + 1))
+    flight = simulate(problem, push.T, steps, 4)
+    parts = {name: getattr(flight, name) for name in ("position", "attitude", "velocity", "rate")}
+    state = {name: rows[0] for name, rows in parts.items() if rows is not None}
+    times = {"duration": problem.duration_bounds[1], "start_time": 0.0}
+    rolled = {**state, "mass": problem.mass, **times, "forces": push}
+    flown = made["rollout"](**rolled)
+    jobs = {
+        "step": {**state, "mass": problem.mass, "time": 0.0, "time_step": 0.05, "forces": push[:, :3]},
+        "rollout": rolled,
+        "residual": {
+            **{part: flown[part] for part in ("positions", "attitudes") if part in flown},
+            **{
+                f"{end}_{part}": state[part]
+                for end in ("start", "goal")
+                for part in ("velocity", "rate")
+                if part in state
+            },
+            "forces": push,
+            "mass": problem.mass,
+            **times,
+        },
+    }
+    plain = [
+        (each, str(library), {key: np.array(value).tolist() for key, value in given.items()})
+        for each, given in jobs.items()
+    ]
+    command = [sys.executable, "-I", "-c", ALONE]
+    done = subprocess.run(command, input=json.dumps(plain), capture_output=True, text=True, check=True)
+    for (each, given), line in zip(jobs.items(), done.stdout.splitlines(), strict=True):
+        expected, found = made[each](**given), json.loads(line)
+        assert found.keys() == expected.keys()
+        for key, value in expected.items():
+            value = np.array(ca.densify(value))
+            assert np.isfinite(value).all()
+            np.testing.assert_allclose(found[key], value, atol=1e-12 * (1 + np.abs(value).max()), err_msg=key)
+    assert np.abs(np.array(flown["positions"])[:, -1] - np.array(flown["positions"])[:, 0]).max() > 1e-4

@@ -45,6 +45,8 @@ from dmoc.effects.base import Body
 from dmoc.guess.starting import starting_guess
 from dmoc.links.along import states_of
 from dmoc.links.joint import room
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import flow_between_links
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.starts import local_optima
@@ -248,6 +250,50 @@ def test_hinged_bars_swing_as_their_angles_say(order, counts):
     a, b = bars((0.3, 0.9), 3.0)
     place = np.array([np.cos(a) + 0.5 * np.cos(b), np.sin(a) + 0.5 * np.sin(b), 0.0])
     errors = [np.abs(simulate(problem, steps=n, order=order).position[-1, 3:] - place).max() for n in counts]
+    assert np.log2(errors[0] / errors[1]) > order - 0.3, errors
+
+
+@pytest.mark.parametrize("order, counts", [(2, (80, 160)), (4, (60, 120))])
+def test_state_control_costate_and_cost_of_hinged_bars_are_of_the_order(order, counts):
+    """At the step ends; of costates and of controls what motors in the joints and the bars' own motion see."""
+    problem = arm(effects=[DOWN], duration=3.0)
+    exact = solve(problem, order=8, steps=96)
+    dynamics, errors = Dynamics.of(problem), []
+
+    def ends(found):
+        """Every place, control, costate along the ways that the joints let be, at the quarters of the way."""
+        pick = np.linspace(0, len(found.path.position) - 1, 5).round().astype(int)
+        places, costates = found.path.position[pick], found.costate[pick]
+        inner = []
+        for place, costate in zip(places, costates, strict=True):
+            bars = dynamics.bars(place).full()
+            moving = dynamics.to_freedom(place, costate).full().ravel()
+            inner.append(moving - np.linalg.pinv(bars) @ (bars @ moving))
+        return places, found.path.control[pick], np.array(inner), np.array([found.objective])
+
+    best = ends(exact)
+    for steps in counts:
+        found = solve(problem, order=order, steps=steps, guess=exact)
+        assert found.success
+        errors.append([np.abs(one - other).max() for one, other in zip(ends(found), best, strict=True)])
+    observed = np.log2(np.divide(*errors))
+    assert (observed > order - 0.3).all(), (observed, errors)
+
+
+@pytest.mark.parametrize("order, counts", [(2, (100, 200)), (4, (40, 80)), (6, (20, 40)), (8, (12, 24))])
+def test_a_march_of_a_free_flyer_with_an_arm_is_of_its_order(order, counts):
+    """Against order 8 with fine steps, under torques of the motors that are polynomials of the time."""
+    problem = replace(load_problem("arm_in_space").make(), duration=8.0)
+
+    def flown(order, steps):
+        rule = scheme(order)
+        nodes = np.append((np.arange(steps)[:, None] + rule.points[:-1]).ravel() / steps, 1.0) * 8.0
+        push = np.stack([2e-3 * np.sin(nodes), 1e-3 * np.cos(2 * nodes)], axis=-1)
+        flight = simulate(problem, push, steps, order)
+        return np.concatenate([flight.position[-1], flight.attitude[-1], flight.velocity[-1], flight.rate[-1]])
+
+    exact = flown(8, 96)
+    errors = [np.abs(flown(order, steps) - exact).max() for steps in counts]
     assert np.log2(errors[0] / errors[1]) > order - 0.3, errors
 
 
