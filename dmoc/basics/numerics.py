@@ -140,3 +140,14 @@ def chained(rows: ca.SX, total: ca.SX, z: ca.SX, y: ca.SX, known: ca.SX) -> list
     slope = first[:n] + moves.T @ first[n:]
     parts = ca.substitute([jacobian, ca.triu(hessian), slope], [y], [known])
     return [ca.sparsify(part) for part in ca.cse(parts)]
+
+
+def used_in(symbols: ca.SX, *results: ca.SX) -> list[int]:
+    """Which of some symbols are in the results."""
+    found = {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*results))}
+    return [i for i, symbol in enumerate(symbols.elements()) if symbol.element_hash() in found]
+
+
+def nonzeros_of(matrix: ca.SX) -> ca.SX:
+    """The structural nonzeros of a matrix as a column."""
+    return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)

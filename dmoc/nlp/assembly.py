@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.compiled import compiled
-from dmoc.basics.numerics import chained
+from dmoc.basics.numerics import chained, nonzeros_of, used_in
 
 # Sums of at most this many entries are made by picking one entry after the other; the rest of a longer one, as
 # for a free duration that is in every step, is added up at once.
@@ -87,10 +87,10 @@ def kernel(
         "rows": ca.densify(rows),
         "cost": ca.densify(cost),
         "gradient": ca.densify(ca.gradient(cost, variables)),
-        "jacobian": _nonzeros(jacobian),
-        "hessian": _nonzeros(hessian),
+        "jacobian": nonzeros_of(jacobian),
+        "hessian": nonzeros_of(hessian),
     }
-    used = _used(data, rows, cost), _used(parameters, rows, cost)
+    used = used_in(data, rows, cost), used_in(parameters, rows, cost)
     arguments = [variables, data[used[0]], parameters[used[1]]]
     dual = [*arguments, multipliers, weight]
     functions = {
@@ -99,12 +99,6 @@ def kernel(
     }
     slope = ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)])
     return Kernel(name, functions, used, jacobian.sparsity(), hessian.sparsity(), not cost.is_zero(), slope)
-
-
-def _used(symbols: ca.SX, *results: ca.SX) -> list[int]:
-    """Which of some symbols are in the results."""
-    found = {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*results))}
-    return [i for i, symbol in enumerate(symbols.elements()) if symbol.element_hash() in found]
 
 
 @dataclass(frozen=True)
@@ -215,10 +209,6 @@ def assemble(
         ca.Function("nlp_jac_g", given, [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
         ca.Function("nlp_hess_l", [*given, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]),
     )
-
-
-def _nonzeros(matrix: ca.SX) -> ca.SX:
-    return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)
 
 
 def _constant(values: np.ndarray) -> ca.MX:
