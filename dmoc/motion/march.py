@@ -196,13 +196,11 @@ def rollout(
         count = min(PIECE, steps - begin)
         if count < PIECE and begin:
             march = advance.mapaccum(count)
-        widths = [value.shape[1] // steps for value in inputs]
-        pieces = [
-            value.reshape(len(value), steps, wide)[:, begin : begin + count].reshape(len(value), count * wide)
-            for value, wide in zip(inputs, widths, strict=True)
-        ]
-        found = march(states[:, begin], *pieces)
-        states[:, begin + 1 : begin + count + 1] = found
+        pieces = []
+        for value in inputs:
+            wide = value.shape[1] // steps
+            pieces.append(value[:, begin * wide : (begin + count) * wide])
+        states[:, begin + 1 : begin + count + 1] = march(states[:, begin], *pieces)
     return states[:n].T + path.position[0], states[n:count_of_states].T
 
 
