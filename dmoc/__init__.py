@@ -103,7 +103,6 @@ if TYPE_CHECKING:
     from dmoc.missions.front import verify as verify
     from dmoc.missions.solution import MissionSolution as MissionSolution
     from dmoc.motion.march import Trajectory as Trajectory
-    from dmoc.motion.march import simulate as simulate
     from dmoc.nlp.solving import NLP as NLP
     from dmoc.nlp.transcription import transcribe as transcribe
     from dmoc.parts.actuator import Actuator as Actuator
@@ -134,6 +133,7 @@ if TYPE_CHECKING:
     from dmoc.studies.accuracy import Formulation as Formulation
     from dmoc.studies.accuracy import work_precision as work_precision
     from dmoc.studies.drift import drift as drift
+    from dmoc.studies.flights import simulate as simulate
     from dmoc.sweeps.sweep import sweep as sweep
 
 

@@ -35,6 +35,7 @@ from dmoc.cli.options import (
     problem_of,
     show_answer,
     switch,
+    transfer_of,
     writable,
 )
 
@@ -108,7 +109,7 @@ def effects(
     from dmoc.reports.tables import influence_table
     from dmoc.studies.effects import influences
 
-    _, problem = problem_of(name, settings)
+    problem = transfer_of(name, settings, "effects")
     solution = dmoc.solve(problem, order=order, steps=steps, hold=hold)
     if not solution.success:
         show_answer(solution, None, as_json=False)

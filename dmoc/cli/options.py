@@ -86,16 +86,34 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
 
     values = parse_settings(settings or ())
     file = load_problem(name)
-    return file, file.make(**values)
+    problem = file.make(**values)
+    return file, getattr(problem, "alone", None) or problem
+
+
+def transfer_of(name: str, settings: list[str] | None, verb: str) -> Any:
+    """The problem of a verb that has no meaning for a mission of several legs."""
+    problem = problem_of(name, settings)[1]
+    if hasattr(problem, "plan"):
+        raise ValueError(
+            f"dmoc {verb} takes a transfer, but {name} is a mission of legs; state the leg that you mean as a "
+            "TransferProblem"
+        )
+    return problem
 
 
 def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: Any, unit: str | None) -> Any:
     """The best of the optima that several guesses lead to; all of them are shown if a unit is given."""
     from dmoc.reports import words as report
     from dmoc.reports.tables import optima_table
-    from dmoc.solver.starts import local_optima
 
-    found = local_optima(problem, starts, order, hold, guess)
+    if hasattr(problem, "plan"):
+        from dmoc.studies.optima import mission_optima
+
+        found = mission_optima(problem, starts, order, hold, guess)
+    else:
+        from dmoc.solver.starts import local_optima
+
+        found = local_optima(problem, starts, order, hold, guess)
     if unit is not None:
         report.console().print(optima_table(found, unit))
     return found[0].path if found else guess
@@ -128,7 +146,8 @@ def attached(path: Path, source: str | None) -> Solution:
             "give it with --problem PATH"
         )
     file = load_problem(source)
-    attached = solution.attach(file.make(**known.parameters))
+    made = file.make(**known.parameters)
+    attached = solution.attach(getattr(made, "alone", None) or made)
     # a solution that was saved from Python has no hash: there may have been no problem file
     if known.source_hash and known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")

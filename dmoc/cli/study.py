@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, writable
+from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, transfer_of, writable
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -47,7 +47,6 @@ def study(
     from dmoc.charts.study import save_study
     from dmoc.reports import study as report_study
     from dmoc.reports import words as report
-    from dmoc.scene.problem_file import load_problem, parse_settings
     from dmoc.studies.accuracy import work_precision
     from dmoc.studies.other_methods import load_methods
 
@@ -56,7 +55,7 @@ def study(
     chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
     live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
-        problem = load_problem(name).make(**parse_settings(settings or ()))
+        problem = transfer_of(name, settings, "study")
         methods = {} if against is None else load_methods(against)
         told = live.update if live else None
         trials = work_precision(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)

@@ -223,7 +223,7 @@ def solve_mission(
     if mesh is not None:
         raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
     climb = Climb(mission, options, progress, compiled, time_limit)
-    path = _first_path(mission, order, steps, hold, guess)
+    path = first_path(mission, order, steps, hold, guess)
     with climb.interrupt:
         first = climb.attempt(path) if path.warm else climb.from_guess(path)
         if not first.solved:
@@ -234,7 +234,7 @@ def solve_mission(
         return answered(climb, *climb.refined(first, tol), tol)
 
 
-def _first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
+def first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
     """The path to start from, on its first meshes."""
     given = mission.guess if guess is None else guess
     given = getattr(given, "path", given)

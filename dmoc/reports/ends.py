@@ -46,6 +46,8 @@ def met_words(solution: Solution) -> str:
     goal = solution.require_problem().goal
     if not goal.moves:
         return ""
+    # Of a mission the last leg ends there.
+    solution = getattr(solution, "legs", (solution,))[-1]
     if solution.attitude is not None and not (goal.has_position and goal.point.anchored):
         return f"goal met at the attitude {_point(solution.attitude[-1])}"
     return f"goal met at {_point(solution.position[-1])} m"

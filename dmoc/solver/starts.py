@@ -52,13 +52,13 @@ class Optimum:
     ----------
     objective : float
         In the objective's own unit.
-    path : DiscretePath
+    path : DiscretePath or MissionPath
     starts : tuple of str
         The guesses that led to it.
     """
 
     objective: float
-    path: DiscretePath
+    path: Any
     starts: tuple[str, ...]
 
 
@@ -163,7 +163,7 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
         ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
         for turns in (1, -1, 2, -2):
             windings = windings_between(problem, base.duration, ends, turns)
-            turned = center + _turned_around(base.position - center, turns * base.fractions)
+            turned = center + turned_around(base.position - center, turns * base.fractions)
             position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
     yield from ways_past(problem, base)
@@ -200,7 +200,7 @@ def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, 
         yield f"bend {number}" + (f" of {name}" if name else ""), replace(path, position=position)
 
 
-def _turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Positions around the origin, each turned by its number of `turns` in the plane of the motion."""
     padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
     normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)
