@@ -48,7 +48,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     if status == "solved":
         message, success = "a local optimum", True
     else:
-        message, success = STATUSES[status].advice, False
+        message, success = climb.reason or STATUSES[status].advice, False
     if success and not met:
         status, success = NOT_MET, False
         reached = "unknown" if error is None else f"{error.largest:.1e}"

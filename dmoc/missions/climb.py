@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import whole
+from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered
 from dmoc.missions.guess import guessed
-from dmoc.missions.path import MissionPath, finer
+from dmoc.missions.path import MissionPath, cold, finer, stretched
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
@@ -23,6 +24,7 @@ from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+from dmoc.solver.ladder import UNEXPLAINED
 from dmoc.solver.meshes import A_TURN, UNEVEN, WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
 
@@ -71,6 +73,8 @@ class Climb:
         self.levels: list[Level] = []
         # The last attempt that solved the mission itself, not one whose |F| is rounded more widely.
         self.held: Attempt | None = None
+        # What is in the way, where no attempt succeeded.
+        self.reason = ""
 
     def attempt(
         self, path: MissionPath, rounding: float | None = None, most: int | None = None, carried: bool = False
@@ -120,10 +124,18 @@ class Climb:
             return tried
         best = tried
         for factor in OTHER_DURATIONS:
-            other = self._staged(_stretched(self.mission, path, factor), stages)
+            other = self._staged(stretched(self.mission, path, factor), stages)
             if other.solved or other.answer.status == "stopped":
                 return other
         return best
+
+    def explained(self, path: MissionPath, failed: Attempt) -> Attempt:
+        """A failed attempt; or the answer from a path that the search for the cause finds."""
+        if failed.answer.status not in UNEXPLAINED or self.interrupt.seen:
+            return failed
+        starts = path, cold(failed.path)
+        near, self.reason = mission_cause(failed.program, starts, self.levels.append, self.interrupt)
+        return failed if near is None else self._staged(near, self._stages())
 
     def _staged(self, path: MissionPath, stages: list[float | None]) -> Attempt:
         for i, width in enumerate(stages):
@@ -174,7 +186,7 @@ class Climb:
                 break
             found = self.attempt(onto, carried=True)
             if not found.solved and found.answer.status != "stopped":
-                found = self.attempt(_cold(onto), carried=True)
+                found = self.attempt(cold(onto), carried=True)
             if found.answer.status == "stopped":
                 return found, error, False
             if not found.solved:
@@ -226,6 +238,8 @@ def solve_mission(
     path = first_path(mission, order, steps, hold, guess)
     with climb.interrupt:
         first = climb.attempt(path) if path.warm else climb.from_guess(path)
+        if not first.solved:
+            first = climb.explained(path, first)
         if not first.solved:
             return answered(climb, first)
         first = climb.regraded(first, _meshes(mission, first.path, order, steps))
@@ -284,17 +298,3 @@ def _left(changes: list[float]) -> float:
 
 def _rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:
     return problem if problem.actuator.smoothing is None else rounded(problem, rounding)
-
-
-def _cold(path: MissionPath) -> MissionPath:
-    return replace(path, legs=tuple(replace(leg, multipliers={}) for leg in path.legs), forces={})
-
-
-def _stretched(mission: Mission, path: MissionPath, factor: float) -> MissionPath:
-    """A path whose free legs last so many times as long, within their bounds."""
-    legs = []
-    for leg, problem in zip(path.legs, mission.stretches, strict=True):
-        duration = float(np.clip(factor * leg.duration, *problem.duration_bounds))
-        legs.append(replace(leg, duration=duration))
-    begins = path.begins[0] + np.append(0.0, np.cumsum([leg.duration for leg in legs]))[:-1]
-    return replace(path, legs=tuple(legs), begins=tuple(float(t) for t in begins))

@@ -135,6 +135,7 @@ def _known(mission: Mission, begins: np.ndarray) -> list[tuple[int, Any]]:
                 place = where.estimate(float(begins[i]))[0]
                 if not np.isnan(place).any():
                     known.append((i, State(tuple(place), None)))
+                    break
     return known
 
 

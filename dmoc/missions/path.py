@@ -181,3 +181,18 @@ def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
         goal_velocity=last.goal_velocity,
         multipliers={},
     )
+
+
+def cold(path: MissionPath) -> MissionPath:
+    """A path without multipliers."""
+    return replace(path, legs=tuple(replace(leg, multipliers={}) for leg in path.legs), forces={})
+
+
+def stretched(mission: Mission, path: MissionPath, factor: float) -> MissionPath:
+    """A path whose free legs last so many times as long, within their bounds."""
+    legs = []
+    for leg, problem in zip(path.legs, mission.stretches, strict=True):
+        duration = float(np.clip(factor * leg.duration, *problem.duration_bounds))
+        legs.append(replace(leg, duration=duration))
+    begins = path.begins[0] + np.append(0.0, np.cumsum([leg.duration for leg in legs]))[:-1]
+    return replace(path, legs=tuple(legs), begins=tuple(float(t) for t in begins))
