@@ -194,7 +194,7 @@ def export(
     import dmoc
     from dmoc.reports import words as report
 
-    _, problem = problem_of(name, settings)
+    problem = transfer_of(name, settings, "export")
     paths = dmoc.export(problem, folder, 2 if order is None else order, steps, hold, c=not no_c)
     functions = json.loads(paths[0].read_text())["functions"]
     console = report.console()

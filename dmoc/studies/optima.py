@@ -36,6 +36,8 @@ def mission_optima(
         climb = Climb(mission, None, None, False, None)
         with climb.interrupt:
             attempt = climb.from_guess(path)
+            # On a mesh that is too coarse for its path an answer may seem cheaper than any true one.
+            attempt = climb.refined(attempt, None)[0] if attempt.solved else attempt
         if attempt.answer.status == "stopped":
             break
         if attempt.solved:

@@ -180,7 +180,8 @@ def test_other_impulses_are_flown_as_they_are_given():
 def test_several_starts_find_the_other_optima_of_a_mission():
     found = mission_optima(hohmann(), 6)
     assert found[0].objective == pytest.approx(0.284457, rel=1e-4)
-    assert any(one.objective > 0.5 for one in found)
+    # None is cheaper than Hohmann's transfer: on a coarse mesh one would seem to be.
+    assert all(one.objective > 0.28445 for one in found)
     names = [name for one in found for name in one.starts]
     assert "default" in names and "+1 revolutions" in names and len(names) == len(set(names)) <= 6
     best = solve(hohmann(), guess=found[0].path)
@@ -216,6 +217,8 @@ def test_verbs_without_a_meaning_for_missions_say_so_in_one_line(planets, capsys
         code, said = run(capsys, verb, "planets.py")
         assert code == 2 and said.err.startswith(f"error: dmoc {verb} takes a transfer, but planets.py is")
         assert said.err.count("\n") == 1
+    code, said = run(capsys, "export", "planets.py", "folder")
+    assert code == 2 and said.err.startswith("error: dmoc export takes a transfer")
     code, said = run(capsys, "simulate", "planets.py")
     assert code == 2 and "--controls FILE" in said.err and said.err.count("\n") == 1
 
