@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 # The name, unit and colour of the arrows of impulses.
 IMPULSE = ("impulse", "m/s", DARK)
+# The arrow of an impulse is at least this part of the longest one, unless the impulse is none: less than that
+# part of the largest one [-].
+SHORTEST, NOTHING = 0.4, 1e-3
 # Arrows are forces per mass where less than this part of the mass is left [-].
 MUCH_LOST = 0.5
 
@@ -130,6 +133,11 @@ def _kicks(solution: MissionSolution) -> tuple[np.ndarray, np.ndarray, float]:
     axes = solution.dimension
     places = np.array([kick.position for kick in solution.impulses]).reshape(-1, axes)
     changes = np.array([kick.change for kick in solution.impulses]).reshape(-1, axes)
+    sizes = np.linalg.norm(changes, axis=1)
+    longest = sizes.max(initial=0.0)
+    # An arrow that is shorter would be hidden by the mark of its joint.
+    shown = np.where(sizes > NOTHING * longest, np.maximum(sizes, SHORTEST * longest), sizes)
+    changes = changes * (shown / np.where(sizes > 0, sizes, 1.0))[:, None]
     return scaled_arrows(places, changes, 1.5 * extent_of(solution.position), max(len(places), 1))
 
 

@@ -86,7 +86,7 @@ def _headline(solution: Any, late: float, late_unit: str) -> str:
     words = f"{name}{kind} {solution.objective / size:.6g} {unit.replace('^2', SQUARED)}"
     if about.objective_unit != "s":
         words += f", duration {solution.duration / late:.6g} {late_unit}"
-    told = np.ptp(solution.path.mass) == 0 or kind.endswith("final mass")
+    told = np.ptp(solution.path.mass) <= 1e-9 * solution.path.mass.max() or kind.endswith("final mass")
     return words if told else f"{words}, final mass {solution.final_mass:.6g} kg"
 
 

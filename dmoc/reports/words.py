@@ -184,7 +184,7 @@ def figures(solution: Solution) -> str:
     parts = [f"{name} {cost}"]
     if name != "time":
         parts.append(f"duration {lasting(solution.duration)}")
-    if name != "final mass" and solution.final_mass != problem.mass:
+    if name != "final mass" and abs(solution.final_mass - problem.mass) > 1e-9 * problem.mass:
         parts.append(f"final mass {solution.final_mass:.8g} kg")
     return ", ".join(filter(None, [*parts, met_words(solution)]))
 
