@@ -31,8 +31,6 @@ LEG_LINES = ("-", (0, (5, 2)), (0, (1, 1)))
 # Of more legs than this those whose names differ by a number alone share a colour: a legend has no room for
 # all.
 MOST_NAMED = 6
-# A mass changes if it does so by more than this part [-]: joints hand it on with a rounding error.
-ROUNDED = 1e-9
 # Speeds are drawn from zero where they fall below this part of the largest [-].
 NEAR_REST = 0.5
 # The mass is drawn if it changes by more than this part of it [-]: by less it is kept to rounding.
