@@ -24,6 +24,8 @@ TIMES, DURATIONS = 16, 16
 PLACES = 12
 # At most so many whole revolutions are tried.
 MOST_TURNS = 3
+# Coasts cost about the same within this part of the cheapest [-].
+ALIKE = 0.1
 
 
 class Arc(NamedTuple):
@@ -123,17 +125,17 @@ def _cheapest(mu: float, points: list) -> tuple | None:
     (q0, v0), (q1, v1) = (np.moveaxis(np.array([point[i] for point in points]), 1, 0) for i in (2, 3))
     normal = np.cross(q0, v0) + np.cross(q1, v1)
     period = 2 * np.pi * np.sqrt((0.5 * np.minimum(*(np.linalg.norm(q, axis=1) for q in (q0, q1)))) ** 3 / mu)
-    best = None
+    found = []
     for turns in range(MOST_TURNS + 1):
-        may = durations > turns * period
-        for slow in (True, False) if turns else (True,):
-            if not may.any():
-                continue
+        may = np.flatnonzero(durations > turns * period)
+        for slow in (True, False) if turns and len(may) else (True,) * bool(len(may)):
             leaves, arrives = lambert(mu, q0[may], q1[may], durations[may], normal[may], turns, slow)
             cost = np.linalg.norm(leaves - v0[may], axis=1) + np.linalg.norm(v1[may] - arrives, axis=1)
-            cost = np.where(np.isfinite(cost), cost, np.inf)
-            place = int(np.argmin(cost))
-            if np.isfinite(cost[place]) and (best is None or cost[place] < best[0]):
-                at = np.flatnonzero(may)[place]
-                best = float(cost[place]), float(begins[at]), float(durations[at]), q0[at], leaves[place]
-    return best
+            found += [(cost[i], at, leaves[i]) for i, at in enumerate(may) if np.isfinite(cost[i])]
+    if not found:
+        return None
+    least = min(cost for cost, _, _ in found)
+    # Of many that cost about the same the shortest one wanders least among the others.
+    near = [one for one in found if one[0] <= (1 + ALIKE) * least]
+    cost, at, velocity = min(near, key=lambda one: (durations[one[1]], one[0]))
+    return float(cost), float(begins[at]), float(durations[at]), q0[at], velocity
