@@ -70,11 +70,12 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
     from dmoc.films.film import animate as animate
+    from dmoc.legs.encounters import Bounce as Bounce
+    from dmoc.legs.encounters import Flyby as Flyby
+    from dmoc.legs.encounters import Frame as Frame
     from dmoc.legs.ends import Free as Free
     from dmoc.legs.ends import Periodic as Periodic
-    from dmoc.legs.events import Bounce as Bounce
     from dmoc.legs.events import Drop as Drop
-    from dmoc.legs.events import Frame as Frame
     from dmoc.legs.events import Impulse as Impulse
     from dmoc.legs.events import Via as Via
     from dmoc.legs.legs import Coast as Coast

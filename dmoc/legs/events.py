@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
-
-# The remedies that are told where a user's function of a place, or of time and place, cannot be used.
-OF_PLACE = "it must take a position q [m] as a CasADi expression and give a number that is 0 on the surface"
-OF_TIME_AND_PLACE = "it must take (t, q) as CasADi expressions and give a position [m]"
 
 
 class Instant(NamedTuple):
@@ -46,6 +40,9 @@ class Event(ABC):
     A frozen dataclass that derives from this says what becomes of a state, `passed`, and what it is in `words`.
     An event with unknowns of its own names them in `unknowns`, and gives a guess for them in `first_guess`.
     """
+
+    # Whether its unknowns are a velocity change, which costs.
+    pushes: ClassVar[bool] = False
 
     def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
         """Name and unit of each unknown of its own, in a space of so many axes."""
@@ -98,6 +95,7 @@ class Impulse(Event):
 
     limit: float | None = None
     exhaust_velocity: float | None = None
+    pushes: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         for name in ("limit", "exhaust_velocity"):
@@ -200,84 +198,6 @@ class Via(Event):
 
     def words(self) -> str:
         return f"by way of {self.boundary.words()}"
-
-
-@dataclass(frozen=True)
-class Frame(Event):
-    """From here on positions count in another frame: an inertial one, one that turns, another origin.
-
-    Parameters
-    ----------
-    position : callable
-        (t [s], q [m]) -> the position in the new frame [m], of CasADi expressions. Velocities follow by its
-        derivatives.
-    name : str
-        The name of the new frame, for people.
-    """
-
-    position: Callable
-    name: str = "another frame"
-
-    def __post_init__(self) -> None:
-        if not callable(self.position):
-            raise ValueError(f"Frame: position must be a function (t, q); got {short(self.position)}")
-
-    def check_dimension(self, dimension: int) -> None:
-        given = [ca.SX.sym("t"), ca.SX.sym("q", dimension)]
-        count = tried("Frame: position", self.position, given, OF_TIME_AND_PLACE)
-        if count != dimension:
-            raise ValueError(f"Frame: position must give {dimension} values; it gives {count}")
-
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
-        t, q, v = ca.SX.sym("t"), ca.SX.sym("q", here.q.numel()), ca.SX.sym("v", here.v.numel())
-        moved = ca.SX(as_column(self.position(t, q)))
-        change = ca.Function("frame", [t, q, v], [moved, ca.jtimes(moved, q, v) + ca.jacobian(moved, t)])
-        place, velocity = change(here.t, here.q, here.v)
-        return Passed(here._replace(q=place, v=velocity), [])
-
-    def words(self) -> str:
-        return f"from here on in {self.name}"
-
-
-@dataclass(frozen=True)
-class Bounce(Event):
-    """An impact on a surface: the velocity along it stays, that across it turns round.
-
-    Parameters
-    ----------
-    surface : callable
-        q [m] -> a CasADi expression that is 0 on the surface.
-    restitution : float
-        The share of the velocity across that is left [-]: 1 keeps the energy.
-    """
-
-    surface: Callable
-    restitution: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not callable(self.surface):
-            raise ValueError(f"Bounce: surface must be a function of q; got {short(self.surface)}")
-        share = number("Bounce: restitution", self.restitution, "-", nonnegative=True)
-        if share > 1:
-            raise ValueError(f"Bounce: restitution must be 0 to 1 [-]; got {share:g}")
-        checked(self, restitution=share)
-
-    def check_dimension(self, dimension: int) -> None:
-        count = tried("Bounce: surface", self.surface, [ca.SX.sym("q", dimension)], OF_PLACE)
-        if count != 1:
-            raise ValueError(f"Bounce: surface must give 1 value; it gives {count}")
-
-    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
-        q = ca.SX.sym("q", here.q.numel())
-        gap = ca.SX(as_column(self.surface(q)))
-        slope = ca.Function("slope", [q], [gap, ca.gradient(gap, q)])
-        value, normal = slope(here.q)
-        across = ca.dot(here.v, normal) / ca.dot(normal, normal)
-        velocity = here.v - (1 + self.restitution) * across * normal
-        return Passed(here._replace(v=velocity), [Row("surface", value, 0.0, 0.0)])
-
-    def words(self) -> str:
-        return f"an impact of restitution {self.restitution:g}"
 
 
 def condition_rows(boundary: Boundary, here: Instant) -> list[Row]:

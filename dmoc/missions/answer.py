@@ -57,7 +57,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     mass = float(path.legs[-1].mass[-1])
     sizes = [kick.size for kick in impulses if kick.joint == "goal"]
     for event in mission.joints[-1].events:
-        mass = event.burnt(mass, sizes.pop(0) if event.unknowns(1) else 0.0)
+        mass = event.burnt(mass, sizes.pop(0) if event.pushes else 0.0)
     return MissionSolution(
         mission,
         legs,

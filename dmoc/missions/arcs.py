@@ -44,7 +44,7 @@ def cheapest_arc(mission: Mission) -> Arc | None:
     joints = mission.joints
     conditions = any(event.condition is not None for joint in joints[1:-1] for event in joint.events)
     powered = any(leg.controls for leg in mission.stretches)
-    kicked = any(event.unknowns(1) for joint in joints for event in joint.events)
+    kicked = any(event.pushes for joint in joints for event in joint.events)
     if attractor is None or conditions or powered or not kicked or mission.dimension < 2 or mission.closes:
         return None
     center = attractor.place(mission.dimension)

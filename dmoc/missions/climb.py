@@ -156,7 +156,7 @@ class Climb:
             for one in engines
             if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
         ]
-        if sum(len(event.unknowns(1)) for joint in self.mission.joints for event in joint.events) > 2:
+        if sum(event.pushes for joint in self.mission.joints for event in joint.events) > 2:
             # One of several impulses may be none at the optimum.
             own.append(LEAST_WIDTH)
         if not own:

@@ -100,12 +100,18 @@ class MissionPath:
         return replace(self, legs=tuple(legs))
 
 
-def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
-    """The unknowns of each event of a joint that has some."""
+def own_parts(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
+    """The unknowns of each event of a joint; empty for one that has none."""
     sizes = [len(event.unknowns(axes)) for event in joint.events]
     if own is None or not sum(sizes):
-        return []
-    return [part for part in np.split(own[-sum(sizes) :], np.cumsum(sizes)[:-1]) if len(part)]
+        return [np.zeros(0)] * len(sizes)
+    return np.split(own[len(own) - sum(sizes) :], np.cumsum(sizes)[:-1])
+
+
+def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
+    """The velocity change of each impulse of a joint [m/s]."""
+    parts = zip(joint.events, own_parts(joint, own, axes), strict=True)
+    return [part for event, part in parts if event.pushes and len(part)]
 
 
 def finer(path: MissionPath, errors: Sequence[np.ndarray]) -> list[tuple[np.ndarray, int]]:

@@ -35,7 +35,7 @@ class Mission:
     start, goal : Boundary
         As of a `TransferProblem`, or `Free()`; as a goal also `Periodic()`.
     legs : sequence
-        `Leg`, `Coast` and, between them or at the ends, `Impulse`, `Drop`, `Via`, `Frame`, `Bounce`.
+        `Leg`, `Coast` and, between them or at the ends, `Impulse`, `Drop`, `Via`, `Frame`, `Bounce`, `Flyby`.
     effects, actuator, constraints
         Of every leg that has none of its own.
     objective : Objective
@@ -84,7 +84,7 @@ class Mission:
         parts = entries(self.legs)
         if parts is None or not all(isinstance(part, (Leg, Event)) for part in parts):
             raise ValueError(
-                "legs must be a sequence of dmoc.Leg, Coast, Impulse, Drop, Via, Frame or Bounce; "
+                "legs must be a sequence of dmoc.Leg, Coast, Impulse, Drop, Via, Frame, Bounce or Flyby; "
                 f"got {short(self.legs)}"
             )
         checked(self, legs=tuple(parts))

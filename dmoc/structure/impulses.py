@@ -124,7 +124,7 @@ def _without_idle(found: MissionSolution, solve: Callable[..., MissionSolution])
             for i, joint in enumerate(mission.joints)
             if len(joint.events) == 1
             and joint.boundary is None
-            and joint.events[0].unknowns(1)
+            and joint.events[0].pushes
             and np.linalg.norm(found.own[joint.name]) < NO_SIZE * total
         ]
         if not idle:

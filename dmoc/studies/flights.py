@@ -69,13 +69,12 @@ def _flights(mission: Mission, solution: MissionSolution) -> Iterator[Trajectory
 def _behind(joint: Joint, solution: MissionSolution, dynamics: Dynamics, state: tuple) -> tuple:
     """Position, independent velocities and mass behind the events of a joint."""
     from dmoc.legs.events import Instant
-    from dmoc.missions.path import kicks_of
+    from dmoc.missions.path import own_parts
 
     time, q, v, mass = state
     speeds = dynamics.configuration.coordinates.speeds
-    kicks = kicks_of(joint, solution.own.get(joint.name), solution.dimension)
-    for event in joint.events:
-        own = kicks.pop(0) if event.unknowns(1) else np.zeros(0)
+    parts = own_parts(joint, solution.own.get(joint.name), solution.dimension)
+    for event, own in zip(joint.events, parts, strict=True):
         here = Instant(ca.SX(time), ca.SX(q), ca.SX(v), ca.SX(mass))
         after = event.passed(here, ca.SX(own), speeds, 0.0).after
         q, v = (np.array(ca.evalf(part)).ravel() for part in (after.q, after.v))

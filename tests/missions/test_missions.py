@@ -17,7 +17,9 @@ from dmoc import (
     DeltaV,
     Drop,
     Engine,
+    FinalHeight,
     FinalMass,
+    Flyby,
     Frame,
     Free,
     Impulse,
@@ -156,6 +158,43 @@ def test_a_bounce_turns_the_velocity_across_round():
         assert before.duration == pytest.approx(1.0, rel=1e-9)
         assert before.velocity[-1] == pytest.approx([1.0, -2.0], rel=1e-8)
         assert after.velocity[0] == pytest.approx([1.0, 2.0 * restitution], rel=1e-8)
+
+
+def passed(radius):
+    """By a planet at rest at the origin, as high as may be a second later."""
+    return Mission(
+        mass=1.0,
+        start=State((-1, 0), (1, 0)),
+        goal=Free(),
+        legs=[Coast((0.5, 2.0)), Flyby(lambda t: (0 * t, 0 * t), radius, 1.0), Coast(1.0)],
+        objective=FinalHeight(1),
+        guess=lambda t: (t - 1, max(0.0, 0.2 * (t - 1))),
+    )
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.5])
+def test_a_planet_turns_the_velocity_as_far_as_the_nearest_hyperbola(radius):
+    found = dmoc.solve(passed(radius), order=4, steps=4)
+    report = dmoc.verify(found)
+    assert found.success and report.ok, [check for check in report.checks if not check.ok]
+    turn = 2 * np.arcsin(1 / (1 + radius))
+    # Beyond a right angle no more is gained.
+    assert found.objective == pytest.approx(np.sin(min(turn, np.pi / 2)), rel=1e-8)
+    assert np.linalg.norm(found.legs[1].velocity[0]) == pytest.approx(1.0, rel=1e-9)
+    assert found.impulses == ()
+
+
+def test_a_planet_that_moves_gives_speed():
+    mission = replace(
+        passed(1.0),
+        start=State((0, 1), (0, -1)),
+        legs=[Coast(1.0), Flyby(lambda t: (t - 1, 0 * t), 0.01, 1.0), Coast(1.0)],
+        guess=lambda t: (max(0.0, t - 1), abs(t - 1)),
+    )
+    found = dmoc.solve(mission, order=4, steps=4)
+    assert found.success and dmoc.verify(found).ok
+    # Relative to the planet's (1, 0) the velocity (-1, -1) keeps its size, and turns upwards.
+    assert found.legs[1].velocity[0] == pytest.approx([1.0, np.sqrt(2)], abs=1e-5)
 
 
 def test_a_leg_may_count_in_another_frame():

@@ -125,6 +125,7 @@ MAKES = {
     },
     "FinalHeight": {"axis": 1},
     "FinalRadius": {"center": (0, 0)},
+    "Flyby": {"position": lambda t: (2 + 0 * t, 0 * t), "radius": 1.0, "mu": 1.0},
     "Frame": {"position": lambda t, q: q, "name": "another"},
     "Free": {"axes": 2},
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
