@@ -99,9 +99,6 @@ if TYPE_CHECKING:
     from dmoc.links.springs import JointSpring as JointSpring
     from dmoc.links.system import Member as Member
     from dmoc.links.system import System as System
-    from dmoc.missions.front import load as load
-    from dmoc.missions.front import solve as solve
-    from dmoc.missions.front import verify as verify
     from dmoc.missions.solution import MissionSolution as MissionSolution
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.nlp.solving import NLP as NLP
@@ -131,6 +128,9 @@ if TYPE_CHECKING:
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.scene.mission import Mission as Mission
     from dmoc.scene.problem import TransferProblem as TransferProblem
+    from dmoc.structure.front import load as load
+    from dmoc.structure.front import solve as solve
+    from dmoc.structure.front import verify as verify
     from dmoc.studies.accuracy import Formulation as Formulation
     from dmoc.studies.accuracy import work_precision as work_precision
     from dmoc.studies.drift import drift as drift

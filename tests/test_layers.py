@@ -102,7 +102,7 @@ def test_no_files_import_each_other_in_a_circle():
     [
         ("from dmoc.solver.solve import solve", {"solver.solve"}),
         ("import dmoc.solver.solve as s", {"solver.solve"}),
-        ("from dmoc import solve", {"missions.front"}),
+        ("from dmoc import solve", {"structure.front"}),
         ("from dmoc import solver", {"solver"}),
         ("def f():\n    from dmoc.effects import gravity, Spring", {"effects.gravity", "effects"}),
         ("import numpy\nfrom dmoc import __version__", set()),

@@ -11,7 +11,9 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cached_property, partial
 from itertools import chain
 from types import FunctionType
@@ -33,10 +35,11 @@ class Shelf:
 
     _all: ClassVar[list[Shelf]] = []
 
-    def __init__(self, most: int):
+    def __init__(self, most: int, lasting: bool = True):
         self.most = most
         self._held: OrderedDict[Hashable, Any] = OrderedDict()
-        self._all.append(self)
+        if lasting:
+            self._all.append(self)
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The thing with this key; if there is none, `make` makes it, and it is put there."""
@@ -58,13 +61,53 @@ class Shelf:
 _functions = Shelf(MOST)
 
 
+class _Meanwhile:
+    """What is remembered while objects that are not dmoc's own are taken not to change."""
+
+    def __init__(self) -> None:
+        self.shelf = Shelf(MOST, lasting=False)
+        # An object whose address is in a key must live as long as the key.
+        self.kept: dict[int, Any] = {}
+
+
+_meanwhile: ContextVar[_Meanwhile | None] = ContextVar("meanwhile", default=None)
+
+
+@contextmanager
+def unchanged() -> Iterator[None]:
+    """Within it, as in one solve, also objects that are not dmoc's own are known again: by what they are."""
+    token = _meanwhile.set(_meanwhile.get() or _Meanwhile())
+    try:
+        yield
+    finally:
+        _meanwhile.reset(token)
+
+
 def remembered(make: Callable[[], T], *key: Any) -> T:
     """The result of `make`, or its earlier result for the same key."""
     try:
         name = identity(key)
     except TypeError:
+        pass
+    else:
+        return _functions.get(name, make)
+    if (now := _meanwhile.get()) is None:
         return make()
-    return _functions.get(name, make)
+    return now.shelf.get(_identity_now(key, now.kept), make)
+
+
+def _identity_now(value: Any, kept: dict[int, Any]) -> Hashable:
+    """Equal for values that are the same for as long as `kept` is kept."""
+    if type(value) in (tuple, list):
+        return tuple(_identity_now(entry, kept) for entry in value)
+    try:
+        return identity(value)
+    except TypeError:
+        fields = getattr(value, "__dataclass_fields__", {}) if _is_own(type(value)) else {}
+        if fields and not isinstance(value, type):
+            return type(value), tuple(_identity_now(getattr(value, name), kept) for name in fields)
+        kept[id(value)] = value
+        return type(value), id(value)
 
 
 class remembered_property(cached_property):  # noqa: N801 - used as a decorator

@@ -32,9 +32,13 @@ ROUNDING = 10 * np.finfo(float).eps
 
 
 class Evidence:
-    """The numbers of one solution: momenta, velocities, forces, and the scales they are judged by."""
+    """The numbers of one solution: momenta, velocities, forces, and the scales they are judged by.
 
-    def __init__(self, solution: Solution):
+    These scales do not fall below `least`, an extent [m] and a speed [m/s]: a leg may stand still.
+    """
+
+    def __init__(self, solution: Solution, least: tuple[float, float] = (0.0, 0.0)):
+        self.least = least
         self.solution, self.path = solution, solution.path
         self.problem: TransferProblem = solution.require_problem()
         self.dynamics = Dynamics.of(self.problem)
@@ -206,13 +210,13 @@ class Evidence:
         """
         covered = 1e-9 * self.acceleration * self.path.duration**2
         least = least_extent(self.problem.mass, self.problem.inertia)
-        return max(self.path.diagonal, covered, least) or 1.0
+        return max(self.path.diagonal, covered, least, self.least[0]) or 1.0
 
     @cached_property
     def speed(self) -> float:
         """Largest speed at the step ends [m/s]; at least what crosses the extent in the duration."""
         linear = np.linalg.norm(self.velocity[:, self.speeds], axis=1)
-        return max(float(linear.max()), self.extent / self.path.duration)
+        return max(float(linear.max()), self.extent / self.path.duration, self.least[1])
 
     @cached_property
     def turn(self) -> float:

@@ -146,7 +146,7 @@ def simulate(
 @app.command(epilog="Example: dmoc check flight.nc")
 def check(file: File, source: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
-    from dmoc.missions.front import verify
+    from dmoc.structure.front import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)

@@ -75,6 +75,9 @@ Steps = Annotated[
     int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
 ]
 Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
+Structure = Annotated[
+    bool, switch("--structure", help="Make burns, coasts and touches of a coarse answer legs with free ends.")
+]
 Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]

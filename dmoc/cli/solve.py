@@ -17,6 +17,7 @@ from dmoc.cli.options import (
     Quiet,
     Settings,
     Steps,
+    Structure,
     best_start,
     ends_at_once,
     problem_of,
@@ -48,6 +49,7 @@ def solve(
             metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
         ),
     ] = 1,
+    structure: Structure = False,
     time_limit: Annotated[
         float | None,
         typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
@@ -74,8 +76,9 @@ def solve(
             start = best_start(problem, starts, order, hold, start, None if as_json or quiet else unit)
         with watched(as_json or quiet, unit) as progress:
             numerics = order, steps, tol, hold, None, start, None
-            solution = dmoc.solve(problem, *numerics, progress, compiled, time_limit)
-        from dmoc.missions.front import verify
+            limits = progress, compiled, time_limit
+            solution = dmoc.solve(problem, *numerics, *limits, structure=structure)
+        from dmoc.structure.front import verify
 
         verdict = verify(solution) if solution.optimal else None
     if out is not None:

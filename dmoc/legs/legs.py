@@ -29,6 +29,9 @@ class Leg:
         Order of the scheme and number of steps of this leg.
     name : str
         Its name in messages, tables and pictures.
+    control_degree : int, optional
+        Each control is one polynomial in time of this degree over the leg. That is needed where the cost is
+        linear in it and it stays between its limits: values that differ from node to node chatter there.
     """
 
     duration: Any = None
@@ -38,12 +41,15 @@ class Leg:
     order: int | None = None
     steps: int | None = None
     name: str = ""
+    control_degree: int | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
         if self.steps is not None:
             whole("Leg: steps", self.steps, least=2)
+        if self.control_degree is not None:
+            whole("Leg: control_degree", self.control_degree, least=0)
         if self.order is not None and whole("Leg: order", self.order, least=2) not in (2, 4, 6, 8):
             raise ValueError(f"Leg: order must be 2, 4, 6 or 8; got {short(self.order)}")
 

@@ -13,10 +13,13 @@ from dmoc.checks.evidence import Evidence
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
+from dmoc.results.solution import Solution
 from dmoc.scene.mission import Mission
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8
+# A leg is judged by its own extent and speed, but at least by this part of the mission's [-].
+LEAST = 1e-2
 # Another impulse helps if the primer vector is longer than its length at impulses by this part [-].
 HELPS = 1e-4
 
@@ -33,7 +36,8 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
     solution = solution if problem is None else solution.attach(problem)
     begun, mission = time.perf_counter(), solution.require_problem()
     with np.errstate(all="ignore"):
-        legs = [Evidence(replace(leg, tolerance=solution.tolerance)) for leg in solution.legs]
+        least = LEAST * solution.path.diagonal, LEAST * max(_fastest(leg) for leg in solution.legs)
+        legs = [Evidence(replace(leg, tolerance=solution.tolerance), least) for leg in solution.legs]
         undefined = next((found for leg in legs if (found := leg.undefined())), "")
         if undefined:
             return Report((Check("legs", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
@@ -48,6 +52,11 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
         if solution.impulses:
             checks.append(primer_check(solution))
     return Report(tuple(checks), time.perf_counter() - begun)
+
+
+def _fastest(leg: Solution) -> float:
+    """The largest speed at the step ends of a leg [m/s]."""
+    return float(np.linalg.norm(leg.velocity, axis=1).max(initial=0.0))
 
 
 def _worst(mission: Mission, legs: Sequence[Evidence], check: Callable[[Evidence], Check]) -> Check:

@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.basics.arguments import whole
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered
-from dmoc.missions.guess import guessed
+from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
 from dmoc.missions.path import MissionPath, cold, finer, stretched
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
@@ -20,22 +20,21 @@ from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.nlp.ipopt import Answer, Interrupt, Watch
+from dmoc.nlp.ipopt_options import NEAR
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
-from dmoc.solver.meshes import A_TURN, UNEVEN, WIDEST_ROUNDING
+from dmoc.solver.meshes import WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
 
-# A leg has this order if none is asked for: inside a leg nothing switches, so that a high order pays.
-ORDER = 6
-# A leg has this many steps at each order, if no number is asked for.
-STEPS = {2: 80, 4: 24, 6: 12, 8: 10}
 # An attempt from a guess ends after this many iterations.
 MOST_TRYING = 200
 # A mesh is refined if its steps err by more than this part of the path [-], at most so many times.
 ACCURATE, MOST_MENDED = 1e-5, 3
+# Near to the answer Ipopt is asked for this [-]: at limits the barrier leaves an error of that size.
+SHARP = 1e-12
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -77,14 +76,25 @@ class Climb:
         self.reason = ""
 
     def attempt(
-        self, path: MissionPath, rounding: float | None = None, most: int | None = None, carried: bool = False
+        self,
+        path: MissionPath,
+        rounding: float | None = None,
+        most: int | None = None,
+        carried: bool = False,
+        near: tuple[float, float] | None = None,
     ) -> Attempt:
-        """Solve on the meshes of a path."""
+        """Solve on the meshes of a path.
+
+        Where that is nearly the answer without multipliers, `near` says how near to limits Ipopt begins, and
+        with which parameter of the barrier [-].
+        """
         begun, mission = time.perf_counter(), self.mission
         problems = [_rounded(problem, rounding) for problem in mission.stretches]
         program = MissionProgram.of(mission, problems, path, rounding)
         watch = self._watch(program)
-        limits = {} if most is None else {"ipopt.max_iter": most}
+        limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
+        if near is not None:
+            limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
         built = time.perf_counter() - begun
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
@@ -172,14 +182,18 @@ class Climb:
         again = attempt if all(same) else self.attempt(attempt.path.onto(meshes), carried=True)
         return again if again.solved else attempt
 
-    def refined(self, attempt: Attempt, tol: float | None) -> tuple[Attempt, Error | None, bool]:
-        """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`."""
+    def refined(
+        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE
+    ) -> tuple[Attempt, Error | None, bool]:
+        """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
+
+        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum.
+        """
         error, changes = None, []
         for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
             errors = self._errors(attempt)
             worst = max(float(each.sum()) for each in errors)
-            wanted = ACCURATE if tol is None else tol
-            if tol is None and worst <= wanted:
+            if tol is None and worst <= accurate:
                 break
             onto = attempt.path.onto(finer(attempt.path, errors))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
@@ -200,13 +214,16 @@ class Climb:
                     return attempt, error, True
         return attempt, error, tol is None
 
+    def largest_error(self, attempt: Attempt) -> float:
+        """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
+        return max(float(each.sum()) for each in self._errors(attempt))
+
     def _error(self, attempt: Attempt, changes: list[float]) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
         path, missed = attempt.path, 0.0
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
-        worst = max(float(errors.sum()) for errors in self._errors(attempt))
-        return Error(worst, _left(changes), missed)
+        return Error(self.largest_error(attempt), _left(changes), missed)
 
     def _errors(self, attempt: Attempt) -> list[np.ndarray]:
         path = attempt.path
@@ -242,7 +259,7 @@ def solve_mission(
             first = climb.explained(path, first)
         if not first.solved:
             return answered(climb, first)
-        first = climb.regraded(first, _meshes(mission, first.path, order, steps))
+        first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
         if steps is not None and tol is None:
             return answered(climb, first)
         return answered(climb, *climb.refined(first, tol), tol)
@@ -253,34 +270,11 @@ def first_path(mission: Mission, order: int | None, steps: int | None, hold: boo
     given = mission.guess if guess is None else guess
     given = getattr(given, "path", given)
     if isinstance(given, MissionPath):
-        return given.onto(_meshes(mission, given, order, steps)) if order or steps else given
+        return given.onto(meshes_along(mission, given, order, steps)) if order or steps else given
     orders = [leg.order or order or ORDER for leg in mission.plan]
     counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
     path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
-    return path.onto(_meshes(mission, path, order, steps))
-
-
-def _meshes(
-    mission: Mission, path: MissionPath, order: int | None, steps: int | None
-) -> list[tuple[np.ndarray, int]]:
-    """A mesh for each leg along a path: equal steps, or equal angles where it passes near an attractor."""
-    found = []
-    for leg, problem, mine in zip(mission.plan, mission.stretches, path.legs, strict=True):
-        this = leg.order or order or ORDER
-        count = leg.steps or steps
-        rates = problem.attraction.rates(mine.place)
-        at = mine.fractions
-        angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(at)))
-        turns = angles[-1] * mine.duration / (2 * np.pi)
-        if count is None:
-            have = (len(mine.mesh) - 1) * mine.order // this if mine.multipliers else 0
-            count = max(STEPS[this], int(np.ceil(turns * A_TURN[this])), have)
-        mesh = uniform_mesh(count)
-        if rates.max() > UNEVEN * rates.min() > 0:
-            mesh = np.interp(mesh, angles / angles[-1], at)
-            mesh[0], mesh[-1] = 0.0, 1.0
-        found.append((mesh, this))
-    return found
+    return path.onto(meshes_along(mission, path, order, steps))
 
 
 def _change(coarse: Attempt, fine: Attempt) -> float:

@@ -20,7 +20,12 @@ from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+from dmoc.solver.meshes import A_TURN, UNEVEN
 
+# A leg has this order if none is asked for: inside a leg nothing switches, so that a high order pays.
+ORDER = 6
+# A leg has this many steps at each order, if no number is asked for.
+STEPS = {2: 80, 4: 24, 6: 12, 8: 10}
 # A guess of the whole mission is made at this many places, then cut into legs.
 SAMPLES = 400
 # An engine of a guess burns at full thrust as long as this part of the mass is left [-].
@@ -195,3 +200,26 @@ def _own(mission: Mission, joint: Any, legs: list[DiscretePath]) -> np.ndarray |
     parts = [before] if at_start else []
     parts += [event.first_guess(before[:axes], after[:axes]) for event in joint.events]
     return np.concatenate(parts)
+
+
+def meshes_along(
+    mission: Mission, path: MissionPath, order: int | None, steps: int | None
+) -> list[tuple[np.ndarray, int]]:
+    """A mesh for each leg along a path: equal steps, or equal angles where it passes near an attractor."""
+    found = []
+    for leg, problem, mine in zip(mission.plan, mission.stretches, path.legs, strict=True):
+        this = leg.order or order or ORDER
+        count = leg.steps or steps
+        rates = problem.attraction.rates(mine.place)
+        at = mine.fractions
+        angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(at)))
+        turns = angles[-1] * mine.duration / (2 * np.pi)
+        if count is None:
+            have = (len(mine.mesh) - 1) * mine.order // this if mine.multipliers else 0
+            count = max(STEPS[this], int(np.ceil(turns * A_TURN[this])), have)
+        mesh = uniform_mesh(count)
+        if rates.max() > UNEVEN * rates.min() > 0:
+            mesh = np.interp(mesh, angles / angles[-1], at)
+            mesh[0], mesh[-1] = 0.0, 1.0
+        found.append((mesh, this))
+    return found

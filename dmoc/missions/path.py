@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import casadi as ca
 import numpy as np
 
 from dmoc.legs.legs import Joint
@@ -131,13 +132,16 @@ def finer(path: MissionPath, errors: Sequence[np.ndarray]) -> list[tuple[np.ndar
     return found
 
 
-def kick_cost(mission: Mission, path: MissionPath) -> float:
-    """About the cost of the impulses of a path."""
+def joint_cost(mission: Mission, path: MissionPath) -> float:
+    """About the cost of the impulses of a path and of the state at its goal."""
     total = 0.0
     for joint in mission.joints:
         for values in kicks_of(joint, path.own.get(joint.name), mission.dimension):
             total += abs(float(mission.objective.kick(float(np.linalg.norm(values)), mission.mass)))
-    return total
+    last = path.legs[-1]
+    state = last.place[-1], last.goal_velocity[last.coordinates.speeds], last.mass[-1]
+    end = mission.objective.terminal(ca.DM(path.begins[-1] + last.duration), *map(ca.DM, state))
+    return total + abs(float(end))
 
 
 def cut(path: DiscretePath, fraction: float) -> tuple[DiscretePath, DiscretePath]:

@@ -11,12 +11,12 @@ import casadi as ca
 import numpy as np
 
 from dmoc.missions.joining import JointWriter, Placed, leg_program, own_unknowns, row_to_drop, whole_rows
-from dmoc.missions.path import MissionPath, kick_cost
+from dmoc.missions.path import MissionPath, joint_cost
+from dmoc.missions.within import open_leg, polynomial_block, polynomial_rows
 from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
 from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
 from dmoc.nlp.ipopt_options import NEAR, rounding, settings_for
-from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
-from dmoc.nlp.program import Program
+from dmoc.nlp.layout import LEG_START, Layout
 from dmoc.nlp.units import Units, units_of
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
@@ -59,7 +59,7 @@ class MissionProgram:
         The size of an impulse is rounded at zero over the part `rounding` of the unit of speed [-].
         """
         sizes = [units_of(problem, leg) for problem, leg in zip(problems, path.legs, strict=True)]
-        cost = max(kick_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
+        cost = max(joint_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
         legs, blocks, at = [], [], np.zeros(3, int)
         for problem, leg, unit in zip(problems, path.legs, sizes, strict=True):
             program, mine, parameters = leg_program(problem, leg, replace(unit, cost=cost))
@@ -93,6 +93,11 @@ class MissionProgram:
                 "mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0)
             )
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
+        for placed, plan, name in zip(legs, mission.plan, mission.leg_names, strict=True):
+            smooth, controls, weights = polynomial_rows(placed, plan)
+            rows = _add(rows, group := f"controls of {name}", smooth, placed.program.units, bounds)
+            if smooth:
+                blocks.append(polynomial_block(controls, weights, first_row + rows[group].indices.T))
         lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
         return cls(
             mission,
@@ -139,8 +144,8 @@ class MissionProgram:
     def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""
         parts = [list(leg.program.bounds(leg.program.problem)) for leg in self.legs]
-        for i, (leg, sides) in enumerate(zip(self.legs, parts, strict=True)):
-            self._open_leg(i, leg.program, sides)
+        for i, sides in enumerate(parts):
+            open_leg(self.mission, self.legs, i, sides)
         free = np.full(sum(layout.size for layout, _ in self.own.values()), np.inf)
         first = self.sizes[0] - len(free)
         for place in self.idle_places():
@@ -161,29 +166,6 @@ class MissionProgram:
             groups = [group for group in layout.groups if group.name.startswith("event")]
             found += [begin + place for group in groups for place in range(group.start, group.stop)]
         return found
-
-    def _open_leg(self, index: int, program: Program, sides: list[np.ndarray]) -> None:
-        """Let a joint decide on the mass and the time at the start of a leg, unless the mission fixes them."""
-        lower, upper, columns = sides[0], sides[1], program.columns
-        mission, actuator = self.mission, program.problem.actuator
-        given = index == 0 and not mission.joints[0].events
-        burns = "mass" in columns
-        place = columns["mass" if burns else LEG_MASS].start
-        scale = program.units.mass
-        least = max(actuator.dry_mass if burns else 0.0, 1e-6 * mission.mass)
-        lower[place], upper[place] = least / scale, np.inf
-        if given:
-            lower[place] = upper[place] = mission.mass / scale
-        place = columns[LEG_START].start
-        lower[place], upper[place] = -np.inf, np.inf
-        if index == 0:
-            lower[place], upper[place] = (end / program.units.time for end in mission.start_bounds)
-        if index and program.problem.constraints == self.legs[index - 1].program.problem.constraints:
-            # The place of a joint keeps its limits in the leg before it: a second time they would depend on
-            # those rows.
-            for group in program.rows.groups:
-                if group.kind == "node" and group.owner and group.owner.field == "constraints":
-                    sides[2][group.indices[:, 0]], sides[3][group.indices[:, 0]] = -np.inf, np.inf
 
     def pack(self, path: MissionPath) -> np.ndarray:
         """Scaled unknowns of a path on these meshes."""

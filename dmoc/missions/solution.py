@@ -54,6 +54,8 @@ class MissionSolution:
         Mass behind the goal [kg].
     own, forces : dict of array
         Unknowns and multipliers of the joints, by their names; see `MissionPath`.
+    arcs : tuple
+        If the legs are the arcs of a transfer: what each is, as plain data.
     objective, success, status, message, ladder, worst, warnings, tolerance, error, reason, provenance
         As of a `Solution`.
     """
@@ -74,6 +76,7 @@ class MissionSolution:
     tolerance: float | None = None
     error: Error | None = None
     reason: str = ""
+    arcs: tuple[list[Any], ...] = ()
     provenance: Provenance = field(kw_only=True)
 
     @property
@@ -219,6 +222,7 @@ def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
     facts, _ = solution_parts(solution, plain=True)
     facts |= {"format": MISSION_FILE.name, "format_version": MISSION_FILE.version, "legs": len(solution.legs)}
     facts["final_mass"] = solution.final_mass
+    facts["arcs"] = json.dumps(solution.arcs)
     table: Table = {}
     for i, leg in enumerate(solution.legs):
         mine, variables = solution_parts(leg)
@@ -276,6 +280,7 @@ def _read(facts: dict[str, Any], table: Table, make: Callable) -> MissionSolutio
         json.loads(facts["tolerance"]),
         Error(**error) if (error := json.loads(facts["error"])) else None,
         str(facts["reason"]),
+        tuple(json.loads(facts["arcs"])),
         provenance=Provenance(
             str(facts["problem"]),
             json.loads(facts["parameters"]),

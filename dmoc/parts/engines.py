@@ -185,6 +185,8 @@ class Nozzles(Burner):
         Direction of the force each nozzle makes, one row a nozzle; made unit vectors.
     max_thrust : float or sequence of float
         Largest thrust [N], one number or one a nozzle.
+    min_thrust : float or sequence of float
+        Least thrust [N], one number or one a nozzle; equal to max_thrust where a nozzle burns fully throughout.
     specific_impulse, exhaust_velocity, dry_mass
         As for `Engine`.
     """
@@ -194,6 +196,7 @@ class Nozzles(Burner):
     specific_impulse: float | None = None
     exhaust_velocity: float | None = None
     dry_mass: float = 0.0
+    min_thrust: float | Vector = 0.0
     limit_label = "limit of\na nozzle"
 
     def __post_init__(self) -> None:
@@ -204,16 +207,26 @@ class Nozzles(Burner):
             )
         unit = tuple(tuple(float(x) for x in np.array(row) / np.linalg.norm(row)) for row in rows)
         checked(self, directions=unit)
-        given = entries(self.max_thrust)
-        thrusts = (self.max_thrust,) * len(rows) if given is None else given
-        if len(thrusts) != len(rows):
-            raise ValueError(
-                f"Nozzles: max_thrust has {len(thrusts)} entries but there are {len(rows)} directions; "
-                f"give one number [N] or {len(rows)}"
-            )
-        limits = tuple(number(f"max_thrust[{i}]", x, "N", positive=True) for i, x in enumerate(thrusts))
-        checked(self, max_thrust=limits)
+        most, least = self._each("max_thrust", positive=True), self._each("min_thrust", nonnegative=True)
+        for low, high in zip(least, most, strict=True):
+            if low > high:
+                raise ValueError(
+                    f"Nozzles: min_thrust must not be more than max_thrust; got {low:g} and {high:g} N"
+                )
+        checked(self, max_thrust=most, min_thrust=least)
         self._check_exhaust(self.specific_impulse)
+
+    def _each(self, name: str, **sign: bool) -> tuple[float, ...]:
+        """A thrust for each nozzle [N]."""
+        value, count = getattr(self, name), len(self.directions)
+        given = entries(value)
+        thrusts = (value,) * count if given is None else given
+        if len(thrusts) != count:
+            raise ValueError(
+                f"Nozzles: {name} has {len(thrusts)} entries but there are {count} directions; "
+                f"give one number [N] or {count}"
+            )
+        return tuple(number(f"{name}[{i}]", x, "N", **sign) for i, x in enumerate(thrusts))
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -243,7 +256,7 @@ class Nozzles(Burner):
         return ca.sum1(u)
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(len(self.directions)), np.array(self.max_thrust)
+        return np.array(self.min_thrust), np.array(self.max_thrust)
 
     def force_limit(self) -> float:
         return float(np.max(self.max_thrust))

@@ -69,6 +69,8 @@ def legs_table(solution: MissionSolution) -> RenderableType:
             f"{leg.final_mass:.6g}",
         )
     parts: list[RenderableType] = [Text("Legs", "bold"), table]
+    if solution.arcs:
+        parts.append(Text(f"found from a coarse answer: {solution.reason}"))
     if solution.impulses:
         kicks = plain_table(
             ["impulse at", "time", "velocity change [m/s]", "along each axis [m/s]"], slice(1, 3)

@@ -54,11 +54,15 @@ def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     return problem.start_time + path.duration * np.sort(at)
 
 
-def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+def control_shares(problem: TransferProblem, control: np.ndarray) -> np.ndarray:
     """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    limited = _linear(problem, path.control.shape[1])
-    return (path.control - lower)[:, limited] / (upper - lower)[limited]
+    limited = _linear(problem, control.shape[1])
+    return (control - lower)[:, limited] / (upper - lower)[limited]
+
+
+def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    return control_shares(problem, path.control)
 
 
 def _linear(problem: TransferProblem, size: int) -> np.ndarray:

@@ -35,6 +35,11 @@ def solve(
 ) -> Solution:
     """Solve a transfer problem, coarse to fine.
 
+    With `structure=True`, by its structure: the burns, coasts, singular arcs, touches of zones and ways along
+    limits of a coarse answer become the legs of a mission with free ends, in each of which nothing switches, so
+    that the full order of the scheme is had. The answer is then a MissionSolution; where that does not succeed,
+    or there is one arc alone, it is as without. `order` and `steps` are then those of the coarse answer.
+
     Parameters
     ----------
     problem : TransferProblem or Mission

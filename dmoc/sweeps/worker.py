@@ -134,7 +134,7 @@ def _problem_file(path: str, source_hash: str) -> ProblemFile:
 
 def _solve(problem: Any, task: Task) -> tuple[Any, bool]:
     """From the neighbour if there is one, else, or if that fails, from the problem's own guess."""
-    from dmoc.missions.front import solve
+    from dmoc.structure.front import solve
 
     if task.start is not None:
         solution = solve(problem, guess=unpack(task.start), **task.numerics)
@@ -145,7 +145,7 @@ def _solve(problem: Any, task: Task) -> tuple[Any, bool]:
 
 def _record_of(solution: Any, warm: bool) -> dict[str, Any]:
     """What is kept of a solution; figures of a failed one mean nothing and are left out."""
-    from dmoc.missions.front import verify
+    from dmoc.structure.front import verify
 
     problem = solution.require_problem()
     record: dict[str, Any] = {

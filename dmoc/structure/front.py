@@ -17,14 +17,27 @@ MISSION = "dmoc mission"
 
 
 @wraps(transfer_solver.solve)
-def solve(problem: Any, *given: Any, **numerics: Any) -> Any:
+def solve(problem: Any, *given: Any, structure: bool = False, **numerics: Any) -> Any:
     problem = getattr(problem, "alone", None) or problem
     if not hasattr(problem, "joints"):
-        return transfer_solver.solve(problem, *given, **numerics)
+        found = _by_structure(problem, *given, **numerics) if structure else None
+        return transfer_solver.solve(problem, *given, **numerics) if found is None else found
     # What solves missions is loaded for them alone.
     from dmoc.missions.climb import solve_mission
 
     return solve_mission(problem, *given, **numerics)
+
+
+def _by_structure(problem: Any, *given: Any, **numerics: Any) -> Any:
+    from dmoc.structure.solve import solve_by_structure
+
+    names = ("order", "steps", "tol", "hold", "mesh", "guess", "options", "progress", "compiled", "time_limit")
+    numerics = dict(zip(names, given, strict=False)) | numerics
+    if numerics.pop("hold", False) or numerics.pop("mesh", None) is not None:
+        raise ValueError(
+            "with structure=True forces are not held and meshes are chosen: give neither hold nor mesh"
+        )
+    return solve_by_structure(problem, **numerics)
 
 
 @wraps(verification.verify)
@@ -42,4 +55,9 @@ def load(path: str | os.PathLike) -> Any:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission
 
-    return read_mission(path)
+    found = read_mission(path)
+    if not found.arcs:
+        return found
+    from dmoc.structure.solution import structured
+
+    return structured(found)

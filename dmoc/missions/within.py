@@ -1,0 +1,111 @@
+"""The program of a leg within a mission: what its neighbours decide, and controls that are polynomials."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from dmoc.legs.legs import Leg
+from dmoc.missions.joining import Placed
+from dmoc.motion.mesh import node_fractions
+from dmoc.nlp.assembly import Block, kernel
+from dmoc.nlp.layout import LEG_MASS, LEG_START
+from dmoc.nlp.program import Program
+from dmoc.parts.rows import Row
+from dmoc.scene.mission import Mission
+from dmoc.scene.problem import TransferProblem
+
+
+def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list[np.ndarray]) -> None:
+    """Let joints decide on the mass and the time at the start of a leg, and on its places at both ends.
+
+    `sides` are the lower and upper bounds of its unknowns, then of its rows, which are changed in place.
+    """
+    program = legs[index].program
+    lower, upper, columns = sides[0], sides[1], program.columns
+    actuator = program.problem.actuator
+    given = index == 0 and not mission.joints[0].events
+    burns = "mass" in columns
+    place = columns["mass" if burns else LEG_MASS].start
+    scale = program.units.mass
+    least = max(actuator.dry_mass if burns else 0.0, 1e-6 * mission.mass)
+    lower[place], upper[place] = least / scale, np.inf
+    if given:
+        lower[place] = upper[place] = mission.mass / scale
+    place = columns[LEG_START].start
+    lower[place], upper[place] = -np.inf, np.inf
+    if index == 0:
+        lower[place], upper[place] = (end / program.units.time for end in mission.start_bounds)
+    else:
+        _leave(program, legs[index - 1].program.problem, 0, sides)
+    if index + 1 < len(legs):
+        _leave(program, legs[index + 1].program.problem, -1, sides)
+
+
+def _leave(program: Program, beside: TransferProblem, place: int, sides: list[np.ndarray]) -> None:
+    """Leave limits at the first or last node of a leg to the leg beside it.
+
+    A second time, rows and bounds of the same place would depend on each other. Of equal constraints the
+    earlier leg keeps its limits; one that the leg beside it follows is left to that one.
+    """
+    mine, other = program.problem.constraints, beside.constraints
+    if len(mine) != len(other):
+        return
+    same = [
+        (place == 0 and one == two) or (getattr(two, "follows", False) and not getattr(one, "follows", False))
+        for one, two in zip(mine, other, strict=True)
+    ]
+    for group in program.rows.groups:
+        if (
+            group.kind == "node"
+            and group.owner
+            and group.owner.field == "constraints"
+            and same[group.owner.entry]
+        ):
+            sides[2][group.indices[:, place]], sides[3][group.indices[:, place]] = -np.inf, np.inf
+    boxes = [np.isfinite(one.bounds(program.problem.dimension)).any() for one in mine]
+    if any(boxes) and all(left for left, box in zip(same, boxes, strict=True) if box):
+        at = program.columns["position"].indices[:, place]
+        sides[0][at], sides[1][at] = -np.inf, np.inf
+
+
+def polynomial_rows(placed: Placed, leg: Leg) -> tuple[list[Row], np.ndarray, np.ndarray]:
+    """Rows, the unknowns in each and their weights, by which every control is a polynomial over a leg.
+
+    Each control is what the polynomial through a few others says. Those few are nearest to Chebyshev's points,
+    through which a polynomial does not swing.
+    """
+    program, degree = placed.program, leg.control_degree
+    mesh, group = program.mesh, program.columns["force"]
+    at = 0.5 * (mesh[1:] + mesh[:-1]) if program.hold else node_fractions(mesh, program.scheme)
+    if degree is None or degree + 1 >= len(at) or not group.labels:
+        return [], np.empty((0, 0), int), np.empty((0, 0))
+    few = _few(at, degree)
+    rest = np.setdiff1d(np.arange(len(at)), few)
+    # Lagrange's polynomials of the few at the rest.
+    weights = np.ones((len(few), len(rest)))
+    for i, place in enumerate(at[few]):
+        others = np.delete(at[few], i)
+        weights[i] = np.prod((at[rest][:, None] - others) / (place - others), axis=1)
+    places = placed.columns + group.indices
+    columns = [np.vstack([mine[rest], np.repeat(mine[few][:, None], len(rest), axis=1)]) for mine in places]
+    names = [f"{label}[{node}]" for label in group.labels for node in rest]
+    rows = [Row(name, None, 0.0, 0.0, "N") for name in names]
+    return rows, np.hstack(columns), np.hstack([weights] * len(places))
+
+
+def polynomial_block(columns: np.ndarray, weights: np.ndarray, targets: np.ndarray) -> Block:
+    """The block of the rows that `polynomial_rows` names."""
+    z, d = ca.SX.sym("z", len(columns)), ca.SX.sym("d", len(weights))
+    made = kernel("polynomial", z, d, ca.SX(0, 1), z[0] - ca.dot(d, z[1:]), ca.SX(0))
+    return Block(made, columns, targets, weights)
+
+
+def _few(at: np.ndarray, degree: int) -> np.ndarray:
+    """Different nodes nearest to Chebyshev's points."""
+    wanted = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, degree + 1)) if degree else np.array([0.5])
+    found: list[int] = []
+    for place in wanted:
+        order = np.argsort(np.abs(at - place), kind="stable")
+        found.append(next(int(node) for node in order if node not in found))
+    return np.array(sorted(found))

@@ -1,0 +1,130 @@
+"""The structure of a path: its arcs, what the controls do in each, and the limits that it touches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dmoc.motion.path import DiscretePath
+from dmoc.results.solution import Solution
+from dmoc.results.switches import control_shares
+from dmoc.scene.problem import TransferProblem
+from dmoc.structure.surfaces import Surface, touched
+
+# What the controls do in an arc.
+BURN, COAST, SINGULAR, FREE = "burn", "coast", "singular arc", "arc"
+# A control is between its limits if it is further from them than this part of its span [-].
+INSIDE = 0.02
+# So many nodes in a row between the limits are a singular arc: a switch takes one or two.
+SINGULAR_NODES = 5
+# A limit acts if loosening it by its own size would change the objective by this part of it [-].
+ACTS = 1e-5
+# A path follows a limit if that acts over more than this many steps; else it touches it.
+FOLLOWED_STEPS = 2.5
+
+
+class Arc(NamedTuple):
+    """A part of a path: what the controls do, where it ends, what it follows, what it touches at its end.
+
+    `end` is a fraction of the whole duration.
+    """
+
+    kind: str
+    end: float
+    follows: Surface | None = None
+    touches: Surface | None = None
+
+    @property
+    def alike(self) -> tuple:
+        """What must be equal for two neighbours to be one arc."""
+        return self.kind, self.follows
+
+    def words(self) -> str:
+        """What it is, for people and as the name of its leg."""
+        return self.kind if self.follows is None else f"{self.kind} along a limit".removeprefix("arc ")
+
+
+def is_switched(problem: TransferProblem) -> bool:
+    """Whether the cost is linear in one control with limits, from nothing to full."""
+    shares = control_shares(problem, np.zeros((1, problem.controls)))
+    return shares.shape[1] == 1 and float(shares[0, 0]) == 0.0
+
+
+def arcs_of(solution: Solution) -> tuple[Arc, ...]:
+    """The arcs of an answer on a coarse mesh."""
+    problem, path = solution.require_problem(), solution.path
+    cuts = _switches(problem, path) if is_switched(problem) else [(FREE, 1.0)]
+    marks: list[tuple[float, float, Surface]] = []
+    for surface, acts in touched(problem, path, ACTS * abs(solution.objective)).items():
+        marks += [(*span, surface) for span in spans_of(path, acts)]
+    return _merged(cuts, sorted(marks), 1.0 / (len(path.mesh) - 1))
+
+
+def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, float]]:
+    """Kinds of arcs and the fractions at which they end, by the one control that is switched."""
+    share = control_shares(problem, path.control)[:, 0]
+    at = path.fractions
+    kinds = np.where(share > 0.5, BURN, COAST).astype(object)
+    # Where |F| is rounded at zero a flat switch looks like one.
+    between = (share > INSIDE) & (share < 1 - INSIDE) & (problem.actuator.smoothing is None)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], between.astype(int), [0]])))
+    for first, last in edges.reshape(-1, 2):
+        if last - first >= SINGULAR_NODES:
+            kinds[first:last] = SINGULAR
+    found = []
+    for node in np.flatnonzero(kinds[1:] != kinds[:-1]):
+        before, after = share[node] - 0.5, share[node + 1] - 0.5
+        part = before / (before - after) if before * after < 0 else 0.5
+        found.append((str(kinds[node]), float(at[node] + part * (at[node + 1] - at[node]))))
+    return [*found, (str(kinds[-1]), 1.0)]
+
+
+def spans_of(path: DiscretePath, acts: np.ndarray) -> list[tuple[float, float]]:
+    """First and last fraction of each run of nodes; gaps within a step do not part a run."""
+    at, steps = path.fractions, path.order // 2
+    nodes = np.flatnonzero(acts)
+    runs = np.split(nodes, np.flatnonzero(np.diff(nodes) > steps + 1) + 1)
+    return [(float(at[run[0]]), float(at[run[-1]])) for run in runs]
+
+
+def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) -> tuple[Arc, ...]:
+    """Arcs between all switches, touches, and begins and ends of ways along limits."""
+    places: list[tuple[float, Surface | None]] = [(end, None) for _, end in cuts]
+    follows: list[tuple[float, float, Surface]] = []
+    for first, last, surface in marks:
+        if last - first > FOLLOWED_STEPS * step:
+            follows.append((first, last, surface))
+            places += [(first, surface), (last, surface)]
+        else:
+            places.append((0.5 * (first + last), surface))
+    arcs, begin = [], 0.0
+    for end, touch in sorted(places, key=lambda place: place[0]):
+        middle = 0.5 * (begin + end)
+        kind = next(kind for kind, last in cuts if middle <= last)
+        along = next((one for first, last, one in follows if first <= middle <= last), None)
+        arcs.append(Arc(kind, end, along, touch))
+        begin = end
+    return tuple(arcs)
+
+
+def alike(one: Sequence[Arc], other: Sequence[Arc]) -> bool:
+    """Whether two chains of arcs are the same but for the times."""
+    return [arc._replace(end=0.0) for arc in one] == [arc._replace(end=0.0) for arc in other]
+
+
+def plain(arcs: Sequence[Arc]) -> tuple[list[Any], ...]:
+    """Arcs as plain data, for files."""
+    return tuple(
+        [arc.kind, arc.end, *(surface if surface is None else list(surface) for surface in arc[2:])]
+        for arc in arcs
+    )
+
+
+def from_plain(data: Sequence[list[Any]]) -> tuple[Arc, ...]:
+    """Arcs from plain data."""
+    return tuple(
+        Arc(str(kind), float(end), *(None if one is None else Surface(*one) for one in surfaces))
+        for kind, end, *surfaces in data
+    )

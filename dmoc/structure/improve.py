@@ -1,0 +1,155 @@
+"""What a solved chain of arcs lacks, and what it has in vain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from dmoc.missions.solution import MissionSolution
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, spans_of
+from dmoc.structure.surfaces import NEAR, pierced, room, touched
+
+# A leg is empty if it lasts less than this many times its shortest duration.
+EMPTY = 1.5
+# An arc is missing where the switching function is on the wrong side by more than this part of its scale [-].
+WRONG = 1e-6
+# It is in doubt up to this many times what it is at a switch, where it should be zero [-].
+DOUBT = 10.0
+# A new arc begins with this part of the whole duration on either side of where that is furthest wrong [-]: a
+# longer one leads away from the answer so far.
+NEW = 1e-3
+
+
+def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSolution) -> tuple[Arc, ...]:
+    """The arcs of an answer without empty ones and with missing ones; the same if there are none."""
+    arcs = settled(arcs, found)
+    if (less := without_empty(arcs, found)) != arcs:
+        return less
+    if (along := _followed(problem, arcs, found)) != arcs:
+        return along
+    more: list[Arc] = []
+    missing = [_wrong(arcs, i, leg) for i, leg in enumerate(found.legs)] if is_switched(problem) else []
+    # At both of its switches the function of a leg is zero, but for the errors of its steps.
+    doubt = max(WRONG, *(DOUBT * abs(float(wrong[-1])) for wrong in missing[1:-1]), 0.0)
+    missing = [np.where(wrong > doubt, wrong, 0.0) for wrong in missing]
+    for i, wrong in enumerate(missing):
+        wrong[[0] * (i > 0) + [-1] * (i < len(missing) - 1)] = 0.0
+    worst = max((float(wrong.max()) for wrong in missing), default=0.0)
+    for i, (arc, leg) in enumerate(zip(arcs, found.legs, strict=True)):
+        begin = arcs[i - 1].end if i else 0.0
+        # One more arc may be enough: what is wrong elsewhere is asked again with it.
+        if worst and missing[i].max() == worst:
+            parts = _parted(arcs, i, found, missing[i])
+        else:
+            parts = _touching(problem, arc, leg, found.objective)
+        more += [part._replace(end=begin + (arc.end - begin) * part.end) for part in parts] or [arc]
+    return tuple(more)
+
+
+def settled(arcs: Sequence[Arc], found: MissionSolution) -> tuple[Arc, ...]:
+    """Arcs with the ends that their legs have."""
+    ends = np.cumsum([leg.duration for leg in found.legs]) / found.duration
+    return tuple(arc._replace(end=float(end)) for arc, end in zip(arcs, ends, strict=True))
+
+
+def without_empty(arcs: tuple[Arc, ...], found: MissionSolution) -> tuple[Arc, ...]:
+    """The arcs without those that last as little as they may; one along a limit becomes a touch of it."""
+    empty = [
+        leg.duration < EMPTY * stretch.duration_bounds[0]
+        for leg, stretch in zip(found.legs, found.require_problem().stretches, strict=True)
+    ]
+    if not any(empty) or all(empty):
+        return arcs
+    left: list[Arc] = []
+    for arc, drop in zip(arcs, empty, strict=True):
+        if drop and left:
+            touches = arc.follows or arc.touches or left[-1].touches
+            left[-1] = left[-1]._replace(end=arc.end, touches=touches)
+        elif not drop:
+            left.append(arc)
+    return joined(left)
+
+
+def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSolution) -> tuple[Arc, ...]:
+    """The arcs with those that stay at a limit between two touches of it as ways along that limit."""
+    left = list(arcs)
+    for i, (one, two) in enumerate(pairwise(arcs)):
+        surface = one.touches
+        if surface is not None and surface == two.touches and two.follows is None:
+            rooms = [
+                room(problem, leg.path, surface, leg.path.fractions, leg.path.position) for leg in found.legs
+            ]
+            if np.abs(rooms[i + 1]).max() < NEAR * np.ptp(np.concatenate(rooms)):
+                left[i + 1] = two._replace(follows=surface)
+    if tuple(left) == arcs:
+        return arcs
+    # Between two ways along the same limit there is no touch of it.
+    return joined(
+        one._replace(touches=None) if one.follows and one.alike == two.alike else one
+        for one, two in zip(left, [*left[1:], left[-1]._replace(kind="")], strict=True)
+    )
+
+
+def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
+    """Neighbours that are alike, and have no touch between them, are one arc."""
+    left: list[Arc] = []
+    for arc in arcs:
+        if left and left[-1].alike == arc.alike and left[-1].touches is None:
+            left[-1] = arc
+        else:
+            left.append(arc)
+    return tuple(left)
+
+
+def _wrong(arcs: tuple[Arc, ...], index: int, leg: Solution) -> np.ndarray:
+    """By how much the switching function says at each node of a leg that a burn coasts, or a coast burns.
+
+    With S = dH/d|F| the rate dS/dt is -(d|lambda|/dt) / m in burns as in coasts, lambda being the costate of
+    the velocity, and S is zero at a switch (Lawden, 1963): no costate of the mass is needed.
+    """
+    switches = [i for i in (index - 1, index) if 0 <= i < len(arcs) - 1 and _is_switch(arcs[i], arcs[i + 1])]
+    path, length = leg.path, np.linalg.norm(leg.costate, axis=1)
+    if arcs[index].kind not in (BURN, COAST) or not switches:
+        return np.zeros(len(length))
+    mass = 0.5 * (path.mass[1:] + path.mass[:-1])
+    switching = np.append(0.0, np.cumsum(-np.diff(length) / mass))
+    switching -= switching[0 if switches[0] < index else -1]
+    return switching * (1 if arcs[index].kind == BURN else -1) * path.mass[0] / length.max()
+
+
+def _parted(arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray) -> list[Arc]:
+    """A burn with a coast in it, or a coast with a burn, where the switching function is furthest wrong."""
+    arc, leg, peak = arcs[index], found.legs[index], int(np.argmax(wrong))
+    at = leg.path.fractions
+    right = np.flatnonzero(wrong == 0.0)
+    first, last = int(right[right < peak].max(initial=0)), int(right[right > peak].min(initial=len(at) - 1))
+    share = NEW * found.duration / leg.duration
+    begin, end = max(at[first], at[peak] - share), min(at[last], at[peak] + share)
+    other = arc._replace(kind=COAST if arc.kind == BURN else BURN, end=end, touches=None)
+    before = [] if peak == 0 else [arc._replace(end=begin, touches=None)]
+    if peak == len(at) - 1:
+        return [*before, other._replace(end=1.0, touches=arc.touches)]
+    return [*before, other, arc._replace(end=1.0)]
+
+
+def _is_switch(one: Arc, other: Arc) -> bool:
+    return {one.kind, other.kind} == {BURN, COAST} and one.touches is None
+
+
+def _touching(problem: TransferProblem, arc: Arc, leg: Solution, objective: float) -> list[Arc]:
+    """The parts of an arc between touches that it does not know of yet."""
+    acts = touched(problem, leg.path, ACTS * abs(objective))
+    marks = [
+        (0.5 * (first + last), surface)
+        for surface, mask in acts.items()
+        for first, last in spans_of(leg.path, mask)
+    ]
+    marks = marks or pierced(problem, leg.path, leg.provenance.start_time)
+    marks = [mark for mark in marks if mark[1] != arc.follows]
+    if not marks:
+        return []
+    return [*(arc._replace(end=at, touches=surface) for at, surface in sorted(marks)), arc._replace(end=1.0)]

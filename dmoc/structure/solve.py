@@ -1,0 +1,179 @@
+"""Solve a transfer by its structure: a coarse answer, its arcs as legs with free ends, the legs improved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.digits import lasting
+from dmoc.basics.memory import unchanged
+from dmoc.checks.verification import Report
+from dmoc.guess.starting import angle_around
+from dmoc.missions.answer import answered
+from dmoc.missions.checks import verify_mission
+from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.solution import MissionSolution
+from dmoc.results.solution import OUT_OF_TIME, Solution
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.meshes import first_path
+from dmoc.solver.solve import solve
+from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
+from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
+from dmoc.structure.improve import improved
+from dmoc.structure.solution import structured
+
+# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer.
+ROUNDED = 1e-3
+# The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
+COARSE_STEPS = {2: 60, 4: 40}
+# Over more revolutions than this there are too many arcs.
+MOST_TURNS = 10
+# Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that
+# something switches inside a leg.
+SETTLED = 1e-6
+# The status of what the user or the time ended.
+ENDED = ("stopped", OUT_OF_TIME)
+# Arcs are improved so many times.
+MOST_ROUNDS = 10
+# How near to limits Ipopt begins from nearly the answer, and with which parameter of the barrier [-]; where the
+# first leads nowhere the second is tried.
+NEAR = (1e-9, 1e-6), (1e-4, 1e-2)
+# An answer that costs more than the coarse one by over this part of it [-] is another optimum, or none.
+WORSE = 0.1
+# An attempt from nearly the answer ends after this many iterations.
+MOST_ITERATIONS = 200
+# Without a tolerance, legs are refined until their steps err by less than this part of the path [-].
+ACCURATE = 1e-9
+
+
+@unchanged()
+def solve_by_structure(
+    problem: TransferProblem,
+    order: int | None = None,
+    steps: int | None = None,
+    tol: float | None = None,
+    **more: Any,
+) -> Solution | MissionSolution | None:
+    """The answer as a mission of arcs; None where that does not succeed.
+
+    `order` and `steps` are those of the coarse answer, `more` are further arguments of `dmoc.solve`. The
+    independent checks judge the result. What was found when the user or the time ended it is told as it is.
+    """
+    if not can_be_parted(problem):
+        return None
+    coarse = coarse_answer(problem, order, steps, **more)
+    if not coarse.success:
+        return coarse if coarse.status in ENDED else None
+    arcs, legs = arcs_of(coarse), (coarse,)
+    if len(arcs) == 1:
+        return None
+    numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
+    climb = Climb(mission_of(problem, arcs), *numerics)
+    climb.levels.extend(coarse.ladder)
+    with climb.interrupt:
+        found = _improved(climb, problem, arcs, legs, tol)
+    if found is None or found.status in ENDED:
+        return found
+    worse = problem.objective.sense * (found.objective - coarse.objective) > WORSE * abs(coarse.objective)
+    return found if found.optimal and not worse and _is_settled(found) and verdict(found).ok else None
+
+
+def _is_settled(found: MissionSolution) -> bool:
+    """Whether the last two meshes of one order agree on the objective, unless the tolerance has been met."""
+    last = found.ladder[-1]
+    same = [level for level in found.ladder if level.order == last.order and level.status == "solved"]
+    if found.tolerance is not None or len(same) < 2 or last.order == FOUND_ORDER:
+        return True
+    return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)
+
+
+def can_be_parted(problem: TransferProblem) -> bool:
+    """Whether arcs can be seen: of one body that does not turn, whose limits are on its place or its force."""
+    return not (
+        problem.turns
+        or problem.links
+        or any(part.limits_speed or part.turns_body or part.point for part in problem.constraints)
+        or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
+    )
+
+
+def coarse_answer(problem: TransferProblem, order: int | None, steps: int | None, **more: Any) -> Solution:
+    """An answer that is good enough to see the arcs in."""
+    engine: Any = problem.actuator
+    if engine.smoothing is not None and engine.smoothing < ROUNDED:
+        problem = replace(problem, actuator=replace(engine, smoothing=ROUNDED))
+    if order is None and steps is None:
+        wanted = first_path(problem, guess=more.get("guess"))
+        order, steps = wanted.order, len(wanted.mesh) - 1
+        if order <= FOUND_ORDER:
+            # On a singular arc forces of order 2 do not chatter.
+            order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
+            steps = COARSE_STEPS[order]
+    return solve(problem, order, steps, **more)
+
+
+def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
+    """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
+    lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
+    return f"{len(arcs)} legs: {', '.join(lengths)}"
+
+
+def verdict(found: MissionSolution) -> Report:
+    """The judgement of the independent checks."""
+    return verify_mission(found)
+
+
+def _improved(
+    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution], tol: float | None
+) -> MissionSolution | None:
+    """The arcs of an answer on fine meshes, once no mesh shows that one is missing or in vain."""
+    for _ in range(MOST_ROUNDS):
+        settled = _settled(climb, problem, arcs, legs)
+        if settled is None:
+            return None
+        known, attempt = settled
+        found = _finished(climb, problem, attempt, tol) if attempt.solved else answered(climb, attempt)
+        # What meshes of low order do not show may be seen now.
+        arcs, legs = improved(problem, known, found) if found.optimal else known, found.legs
+        if alike(arcs, known):
+            return structured(found, arcs=plain(arcs), reason=told(arcs, found))
+    return None
+
+
+def _settled(
+    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution]
+) -> tuple[tuple[Arc, ...], Attempt] | None:
+    """The arcs that neither lack one nor have one in vain, and their answer."""
+    for _ in range(MOST_ROUNDS):
+        climb.mission = mission_of(problem, arcs)
+        path = path_of(problem, arcs, legs)
+        for near in NEAR:
+            attempt = climb.attempt(path, most=MOST_ITERATIONS, near=near)
+            if attempt.solved or attempt.answer.status == "stopped":
+                break
+        if attempt.answer.status == "stopped":
+            return arcs, attempt
+        if not attempt.solved:
+            return None
+        found = answered(climb, attempt)
+        better = improved(problem, arcs, found)
+        if alike(better, arcs):
+            return better, attempt
+        arcs, legs = better, found.legs
+    return None
+
+
+def _finished(climb: Climb, problem: TransferProblem, attempt: Attempt, tol: float | None) -> MissionSolution:
+    """The answer on meshes of high order that are fine enough."""
+    wanted = ACCURATE if tol is None else tol
+    if climb.largest_error(attempt) > wanted:
+        course = Course.of(answered(climb, attempt).legs)
+        path = attempt.path
+        spans = [(begin, begin + leg.duration) for begin, leg in zip(path.begins, path.legs, strict=True)]
+        onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
+        finer = climb.attempt(onto, carried=True)
+        attempt = finer if finer.solved else attempt
+    return answered(climb, *climb.refined(attempt, tol, ACCURATE), tol)

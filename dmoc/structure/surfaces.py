@@ -1,0 +1,224 @@
+"""Surfaces of constraints that a path touches at one instant, or follows for a while."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from dmoc.basics.numerics import cubic_spline
+from dmoc.effects.base import Body
+from dmoc.legs.events import Event, Instant, Passed
+from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
+from dmoc.parts.constraint import Constraint
+from dmoc.parts.rows import Row, title
+from dmoc.scene.problem import TransferProblem
+
+# A node is at a limit if it is within this part of all the room that the path has [-].
+NEAR = 1e-3
+# Each gap between two nodes is looked at in so many places.
+BETWEEN = 8
+# A limit is broken between nodes by more than this part of its scale [-].
+PIERCED = 1e-7
+
+
+class Surface(NamedTuple):
+    """One limit of a constraint: a row of it or, where `row` is -1, a wall across an axis."""
+
+    constraint: int
+    row: int
+    axis: int = -1
+    upper: bool = False
+
+
+def touched(problem: TransferProblem, path: DiscretePath, least: float) -> dict[Surface, np.ndarray]:
+    """The limits on positions that act along a path, each with a mask of the nodes where it does.
+
+    A limit acts at a node if loosening it by its own size would change the objective by more than `least`.
+    """
+    found: dict[Surface, np.ndarray] = {}
+
+    def note(surface: Surface, density: np.ndarray, size: float) -> None:
+        share = density / len(density) * size
+        share[[0, -1]] = 0.0
+        acts = (share > least) & (share > 1e-2 * share.max())
+        if acts.any():
+            found[surface] = acts | _held(problem, path, surface, acts)
+
+    for i, constraint in enumerate(problem.constraints):
+        density = path.multipliers.get(Key("node", "row", title(constraint, i)))
+        for row in range(0 if density is None else density.shape[1]):
+            column = density[:, row]  # type: ignore[index]
+            note(Surface(i, row, upper=bool(column[np.argmax(np.abs(column))] > 0)), np.abs(column), 1.0)
+    walls = path.multipliers.get(POSITION_BOUNDS)
+    boxes = [constraint.bounds(problem.dimension) for constraint in problem.constraints]
+    for axis in range(0 if walls is None else walls.shape[1]):
+        for upper, sign in ((False, -1.0), (True, 1.0)):
+            sides = np.array([sign * box[int(upper)][axis] for box in boxes])
+            if len(sides) and np.isfinite(sides.min()):
+                pushed = np.maximum(0.0, sign * walls[:, axis])  # type: ignore[index]
+                note(Surface(int(sides.argmin()), -1, axis, upper), pushed, path.diagonal)
+    return found
+
+
+def _held(problem: TransferProblem, path: DiscretePath, surface: Surface, acts: np.ndarray) -> np.ndarray:
+    """Nodes at a limit between two nodes where it acts: where no force is needed to stay, none acts between."""
+    free = np.abs(room(problem, path, surface, path.fractions, path.position))
+    near, nodes = free < NEAR * np.ptp(free), np.flatnonzero(acts)
+    held = np.zeros(len(acts), bool)
+    for one, two in pairwise(nodes):
+        if near[one : two + 1].all():
+            held[one : two + 1] = True
+    return held
+
+
+def room(
+    problem: TransferProblem, path: DiscretePath, surface: Surface, at: np.ndarray, places: np.ndarray
+) -> np.ndarray:
+    """By how much places keep a limit, in its own unit; negative where they break it."""
+    t, q, m = ca.SX.sym("t"), ca.SX.sym("q", places.shape[1]), ca.SX.sym("m")
+    gap, limit = limit_of(problem.constraints[surface.constraint], surface, t, q, m)
+    times, masses = problem.start_time + path.duration * at, np.interp(at, path.fractions, path.mass)
+    values = ca.Function("gap", [t, q, m], [gap])(times[None], places.T, masses[None]).full().ravel()
+    return (limit - values) * (1 if surface.upper else -1)
+
+
+def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[tuple[float, Surface]]:
+    """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit."""
+    at = (
+        path.fractions[:-1, None] + np.diff(path.fractions)[:, None] * np.linspace(0, 1, BETWEEN + 1)[:-1]
+    ).ravel()
+    slopes = path.start_velocity * path.duration, path.goal_velocity * path.duration
+    places = cubic_spline(path.fractions, path.position, slopes)(at)
+    problem, found = replace(problem, start_time=begin), []
+    for surface in _surfaces(problem):
+        broken = -room(problem, path, surface, at, places)
+        scale = float(np.ptp(broken))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], broken > PIERCED * scale, [0]])))
+        for first, last in edges.reshape(-1, 2):
+            # What begins or ends at a joint is that joint's.
+            if first > 1 and last < len(at) - 1:
+                found.append((float(at[first + int(np.argmax(broken[first:last]))]), surface))
+    return found
+
+
+def _surfaces(problem: TransferProblem) -> list[Surface]:
+    """All limits on positions."""
+    found, axes = [], problem.dimension
+    q = ca.SX.sym("q", axes)
+    for i, constraint in enumerate(problem.constraints):
+        sides = constraint.bounds(axes)
+        walls = [
+            Surface(i, -1, axis, bool(up))
+            for axis in range(axes)
+            for up in (0, 1)
+            if np.isfinite(sides[up][axis])
+        ]
+        rows = [] if walls else constraint.rows(ca.SX.sym("t"), q, None, ca.SX.sym("m"))
+        for k, row in enumerate(rows):
+            found += [
+                Surface(i, k, upper=up)
+                for up, value in ((False, row.lower), (True, row.upper))
+                if np.isfinite(value)
+            ]
+        found += walls
+    return found
+
+
+def limit_of(constraint: Constraint, surface: Surface, t: Any, q: Any, m: Any) -> tuple[Any, float]:
+    """The expression of a limit and the value that it has on the surface."""
+    if surface.row < 0:
+        side = constraint.bounds(q.numel())[int(surface.upper)]
+        return q[surface.axis], float(side[surface.axis])
+    row = constraint.rows(t, q, None, m)[surface.row]
+    return row.expression, row.upper if surface.upper else row.lower
+
+
+@dataclass(frozen=True)
+class Tangent(Event):
+    """The velocity is along the surface of a limit: a touch of it, or the begin or end of a way along it.
+
+    Without this condition the free time of a touch slides away, and the path runs through the surface.
+    """
+
+    constraint: Constraint
+    surface: Surface
+
+    def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
+        t, q, v, m = (
+            ca.SX.sym("t"),
+            ca.SX.sym("q", here.q.numel()),
+            ca.SX.sym("v", here.v.numel()),
+            ca.SX.sym("m"),
+        )
+        gap = ca.SX(limit_of(self.constraint, self.surface, t, q, m)[0])
+        slope = ca.gradient(gap, q)
+        across = (ca.dot(slope, v) + ca.jacobian(gap, t)) / ca.sqrt(ca.dot(slope, slope))
+        speed = ca.Function("across", [t, q, v, m], [across])(here.t, here.q, here.v, here.m)
+        return Passed(here, [Row("speed", speed, 0.0, 0.0, "m/s")])
+
+    def words(self) -> str:
+        return f"along the limit: the body {self.constraint.words()}"
+
+
+@dataclass(frozen=True)
+class Followed(Constraint):
+    """A constraint one of whose limits the path keeps to exactly.
+
+    Neighbouring legs need not state that limit for the joint between them.
+    """
+
+    base: Constraint
+    surface: Surface
+    follows = True
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        return self.base.unit
+
+    @property
+    def structure(self) -> tuple:
+        return type(self), self.base, self.surface
+
+    def check_dimension(self, dimension: int) -> None:
+        self.base.check_dimension(dimension)
+
+    def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
+        rows = list(self.base.rows_of(t, body, u, m))
+        place = self.surface.row
+        if place >= 0:
+            value = rows[place].upper if self.surface.upper else rows[place].lower
+            rows[place] = rows[place]._replace(lower=value, upper=value)
+        return rows
+
+    def speed_rows_of(self, body: Body) -> list[Row]:
+        return self.base.speed_rows_of(body)
+
+    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+        lower, upper = (np.array(side, float) for side in self.base.bounds(dimension))
+        if self.surface.row < 0:
+            axis = self.surface.axis
+            lower[axis] = upper[axis] = (upper if self.surface.upper else lower)[axis]
+        return lower, upper
+
+    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return self.base.excess(q, v)
+
+    def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return self.base.excess_at(t, q, v)
+
+    def eased(self, slack: float) -> Constraint | None:
+        base = self.base.eased(slack)
+        return None if base is None else replace(self, base=base)
+
+    def outline(self) -> tuple:
+        return self.base.outline()
+
+    def feature(self) -> float:
+        return self.base.feature()
+
+    def words(self) -> str:
+        return f"keeps to the limit by which it {self.base.words()}"

@@ -1,0 +1,235 @@
+"""Answers by their structure: the digits that arcs with free ends give, and how they may deceive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dmoc
+from dmoc import Engine, Fuel, KeepIn, Leg, Mission, State, TransferProblem, UniformGravity
+from dmoc.missions.answer import answered
+from dmoc.missions.checks import verify_mission
+from dmoc.missions.climb import Climb, solve_mission
+from dmoc.scene.problem_file import load_problem
+from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, arcs_of, from_plain
+from dmoc.structure.build import mission_of, path_of
+from dmoc.structure.improve import improved
+from dmoc.structure.solve import NEAR, coarse_answer, solve_by_structure
+
+# Two local optima of the free-flyer, on either side of the obstacles.
+FREE_FLYER = (0.8368975590572365, 0.8624183666704004)
+
+
+def gallery(name):
+    return load_problem(name).make()
+
+
+def bryson_denham():
+    """From x = 0, v = 1 to x = 0, v = -1 in 1 s below x = 1/9: a third of the time at the limit, J = 4."""
+    wall = KeepIn((-np.inf,), (1 / 9,))
+    return TransferProblem(1.0, State((0.0,), (1.0,)), State((0.0,), (-1.0,)), 1.0, constraints=[wall])
+
+
+def kinds(found):
+    return [arc[0] for arc in found.arcs]
+
+
+def test_seven_legs_of_the_least_fuel():
+    found = dmoc.solve(gallery("two_body_fuel"), structure=True)
+    assert found.success and kinds(found) == [BURN, COAST, BURN, COAST, BURN, COAST, BURN]
+    assert found.objective == pytest.approx(0.0767810992156, rel=1e-10)
+    assert found.reason.startswith("7 legs: burn 0.07165 s, coast 4.374 s, burn 0.9329 s")
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 20), (4, 40), (2, 40)])
+def test_three_touches_of_the_free_flyer(order, steps):
+    found = dmoc.solve(gallery("free_flyer"), order, steps, structure=True)
+    assert found.success and len(found.legs) == 4
+    assert min(abs(found.objective / value - 1) for value in FREE_FLYER) < 1e-11
+    assert dmoc.verify(found).ok
+    # At a touch the path is on the sphere and along it.
+    for leg, zone in zip(found.legs, found.problem.constraints, strict=False):
+        offset = leg.position[-1] - np.array(zone.center)
+        assert np.linalg.norm(offset) == pytest.approx(zone.radius, abs=1e-8)
+        assert offset @ leg.velocity[-1] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_a_singular_arc_has_one_polynomial_for_its_force():
+    found = dmoc.solve(gallery("goddard"), structure=True)
+    assert found.success and kinds(found) == [BURN, SINGULAR, COAST]
+    assert found.objective == pytest.approx(1.012836918, rel=1e-9)
+    leg = found.legs[1].path
+    polynomial = np.polynomial.Polynomial.fit(leg.fractions, leg.control[:, 0], 6)
+    assert polynomial(leg.fractions) == pytest.approx(leg.control[:, 0], abs=1e-9)
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 10), (4, 20), (2, 60), (8, 12)])
+def test_a_way_along_a_limit(order, steps):
+    found = dmoc.solve(bryson_denham(), order, steps, structure=True)
+    assert found.success and len(found.legs) == 3
+    assert found.objective == pytest.approx(4.0, rel=1e-12)
+    assert found.legs[1].position == pytest.approx(1 / 9, abs=1e-14)
+    assert dmoc.verify(found).ok
+
+
+def test_a_halo_orbit_left_and_another_reached():
+    found = dmoc.solve(gallery("halo_transfer"), structure=True)
+    assert found.success and len(found.legs) == 7
+    assert found.final_mass == pytest.approx(0.984537, abs=5e-7)
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.slow
+def test_thirteen_legs_to_dionysus():
+    found = dmoc.solve(gallery("dionysus"), structure=True)
+    assert found.success and len(found.legs) == 13
+    assert found.objective == pytest.approx(2718.3396, abs=2e-4)
+    assert dmoc.verify(found).ok
+
+
+DOZEN = [
+    (4, 30),
+    (4, 40),
+    (4, 50),
+    (4, 60),
+    (4, 80),
+    (4, 100),
+    (2, 60),
+    (2, 100),
+    (2, 150),
+    (6, 30),
+    (6, 40),
+    (8, 25),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values", "meshes"),
+    [
+        ("two_body_fuel", [0.0767810992156], DOZEN),
+        (
+            "free_flyer",
+            FREE_FLYER,
+            [(4, 15), (4, 20), *DOZEN[:5], (2, 20), (2, 40), (2, 100), (6, 20), (8, 12)],
+        ),
+        (
+            "goddard",
+            [1.012836918308],
+            [(2, n) for n in (40, 50, 60, 70, 80, 100, 120, 150, 200, 250, 300, 400)],
+        ),
+    ],
+)
+def test_a_dozen_coarse_meshes_lead_to_the_same_digits(name, values, meshes):
+    found = [dmoc.solve(gallery(name), *mesh, structure=True) for mesh in meshes]
+    errors = [min(abs(one.objective / value - 1) for value in values) for one in found]
+    assert dict(zip(meshes, errors, strict=True)) == pytest.approx(dict.fromkeys(meshes, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("order", "steps"), [(2, (40, 80)), (4, (8, 16)), (6, (4, 8)), (8, (3, 6))])
+def test_the_order_of_the_scheme_across_free_switches(order, steps):
+    exact = dmoc.solve(gallery("two_body_fuel"), tol=1e-10, structure=True)
+    errors = []
+    for count in steps:
+        found = solve_mission(exact.problem, order, count, guess=exact)
+        assert found.success
+        errors.append(abs(found.objective / exact.objective - 1))
+    assert np.log2(errors[0] / errors[1]) > order - 0.3
+
+
+# What deceives: the wrong answer comes out red, or is not reached.
+
+
+def test_steps_too_long_for_a_coast_past_a_moon_come_out_red():
+    """Free durations let a coarse mesh cheat: the coast past the Moon is no path of the motion."""
+    problem = gallery("halo_transfer")
+    fine = dmoc.solve(problem, structure=True)
+    uniform = [(np.linspace(0, 1, 9 if leg.duration > 1 else 3), 4) for leg in fine.legs]
+    climb = Climb(fine.problem, None, None, False, None)
+    attempt = climb.attempt(fine.path.onto(uniform), most=300, near=NEAR[0])
+    cheat = answered(climb, attempt)
+    assert not attempt.solved or not verify_mission(cheat)["reference"].ok
+
+
+def test_a_way_along_a_limit_is_undercut_at_order_2_alone():
+    """Forces at nodes undercut its cost, and it shrinks to its shortest duration."""
+    found = dmoc.solve(bryson_denham(), structure=True)
+    assert min(leg.order for leg in found.legs) >= 4
+    rough = [solve_mission(found.problem, 2, count, guess=found) for count in (10, 20)]
+    assert all(one.objective < 4.0 and one.legs[1].duration < 2e-4 for one in rough)
+    assert np.log2((4.0 - rough[0].objective) / (4.0 - rough[1].objective)) > 1.7
+    for order in (4, 6, 8):
+        assert solve_mission(found.problem, order, 10, guess=found).objective == pytest.approx(4.0, rel=1e-12)
+
+
+def test_an_empty_leg_is_dropped():
+    ends = State((0, 0), (0, 0)), State((1, 0.5), (0, 0))
+    engine = Engine(1.0, exhaust_velocity=5.0, smoothing=1e-6)
+    pull = [UniformGravity((0, -0.1))]
+    problem = TransferProblem(1.0, *ends, 4.0, actuator=engine, effects=pull, objective=Fuel())
+    found = dmoc.solve(problem, structure=True)
+    known = from_plain(found.arcs)
+    assert kinds(found) == [BURN, COAST, BURN]
+    # A burn where nothing is to be gained by one shrinks to its shortest duration.
+    middle = 0.5 * (known[0].end + known[1].end)
+    arcs = (known[0], known[1]._replace(end=middle), Arc(BURN, middle + 0.003), *known[1:])
+    climb = Climb(mission_of(problem, arcs), None, None, False, None)
+    attempt = climb.attempt(path_of(problem, arcs, found.legs), near=NEAR[0])
+    assert attempt.solved
+    assert [arc.kind for arc in improved(problem, arcs, answered(climb, attempt))] == kinds(found)
+
+
+def test_a_burn_that_is_missing_is_found_by_the_switching_function():
+    problem = gallery("two_body_fuel")
+    # 60 steps of order 2 show two of the four burns.
+    coarse = coarse_answer(problem, 2, 60)
+    assert len(arcs_of(coarse)) == 4
+    found = dmoc.solve(problem, 2, 60, structure=True)
+    assert len(found.legs) == 7 and dmoc.verify(found).ok
+
+
+def test_touches_without_tangency_lead_through_the_zones():
+    """Their times slide away from where the path would be in the zone, and it runs through between nodes."""
+    found = dmoc.solve(gallery("free_flyer"), structure=True)
+    loose = replace(found.problem, legs=[part for part in found.problem.legs if isinstance(part, Leg)])
+    through = solve_mission(loose, 4, 4, guess=found)
+    assert through.objective < found.objective - 1e-3
+    assert not verify_mission(through)["bounds"].ok
+
+
+def test_a_file_holds_the_structure(tmp_path):
+    problem = gallery("two_body_fuel")
+    found = dmoc.solve(problem, structure=True)
+    found.save(tmp_path / "legs.nc")
+    back = dmoc.load(tmp_path / "legs.nc").attach(problem)
+    assert kinds(back) == kinds(found) and back.objective == found.objective
+    assert [(one.name, one.value) for one in dmoc.verify(back).checks] == [
+        (one.name, one.value) for one in dmoc.verify(found).checks
+    ]
+
+
+def test_an_answer_of_one_arc_is_that_of_the_ordinary_ladder():
+    problem = gallery("point_to_point")
+    assert solve_by_structure(problem) is None
+    one, other = dmoc.solve(problem), dmoc.solve(problem, structure=True)
+    assert one.objective == other.objective and one.ladder[-1].steps == other.ladder[-1].steps
+
+
+def test_what_structure_does_not_take_is_refused():
+    with pytest.raises(ValueError, match="give neither hold nor mesh"):
+        dmoc.solve(gallery("two_body_fuel"), hold=True, structure=True)
+
+
+def test_controls_of_a_leg_as_one_polynomial():
+    ends = State((0, 0), (0, 0)), State((1, 0), (0, 0))
+    mission = Mission(1.0, *ends, [Leg(1.0, control_degree=1), Leg(1.0)])
+    found = dmoc.solve(mission, order=4, steps=6)
+    leg = found.legs[0].path
+    line = np.outer(1 - leg.fractions, leg.control[0]) + np.outer(leg.fractions, leg.control[-1])
+    assert found.success and leg.control == pytest.approx(line, abs=1e-9)
+    with pytest.raises(ValueError, match="control_degree"):
+        Leg(1.0, control_degree=-1)
