@@ -24,7 +24,7 @@ def problem(start: tuple = (0.3, -1.0), revolutions: float = 0.95):
         mass=1.0,
         start=State(start, (0, 0)),
         goal=State((0, 0), (0, 0)),
-        effects=ClohessyWiltshire(1.0),
+        effects=[ClohessyWiltshire(1.0)],
         legs=[Impulse(), Coast((0.01, 6.0)), Impulse(), Coast((0.01, 6.0)), Impulse()],
         objective=DeltaV(),
         duration=2 * pi * revolutions,

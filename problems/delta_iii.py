@@ -37,11 +37,11 @@ def problem(latitude: float = 28.5, apogee: float = 24361140.0 * 1.7308):
     north = radians(latitude)
     pad = RADIUS * cos(north), 0.0, RADIUS * sin(north)
     air = ExponentialAtmosphere(1.225, 0.0, 7200.0, RADIUS, rate=RATE)
-    orbit = {"e": 0.7308, "i": north, "raan": radians(269.8), "argp": radians(130.5)}
+    node, perigee = radians(269.8), radians(130.5)
     return Mission(
         mass=301454.0,
         start=State(pad, (0.0, RATE * pad[0], 0.0)),
-        goal=Orbit(MU, a=apogee / 1.7308, **orbit),
+        goal=Orbit(MU, a=apogee / 1.7308, e=0.7308, i=north, raan=node, argp=perigee),
         effects=[PointGravity(MU), Drag(4 * pi, 0.5, air)],
         legs=[
             Leg(75.2, actuator=engine(*[BOOSTER] * 6, FIRST), name="six boosters"),

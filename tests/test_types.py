@@ -39,8 +39,9 @@ reveal_type(dmoc.solve)
 
 # a line with a mistake, and what the type checker says of it
 WRONG = {
-    "dmoc.solve(problem, odrer=4)": 'Unexpected keyword argument "odrer" for "solve"',
-    "dmoc.solve(problem, order='four')": 'Argument "order" to "solve" has incompatible type "str"',
+    "dmoc.solve(problem, odrer=4)": 'Unexpected keyword argument "odrer" for overloaded function "solve"',
+    "# of the same line": 'No overload variant of "solve" matches argument types "TransferProblem", "int"',
+    "dmoc.solve(problem, order='four')": 'No overload variant of "solve" matches argument types',
     "dmoc.solve(problem).objectiv": '"Solution" has no attribute "objectiv"',
     "dmoc.slove(problem)": 'Module has no attribute "slove"',
     "dmoc.State((0.0, 0.0), 'fast')": 'Argument 2 to "State" has incompatible type "str"',
@@ -76,7 +77,7 @@ def test_a_type_checker_knows_what_is_right_and_what_is_wrong(tmp_path):
     said = mypy(tmp_path, "right.py", "wrong.py", *sorted(map(str, ROOT.glob("problems/*.py"))))
     (revealed,) = (words for _, words in said if "Revealed type" in words)
     assert "def (problem: dmoc.scene.problem.TransferProblem, order: int | None =" in revealed
-    assert revealed.endswith('-> dmoc.results.solution.Solution"')
+    assert "-> dmoc.results.solution.Solution, def (problem: " in revealed
     errors = [(file, words) for file, words in said if words.startswith("error: ")]
     for (file, words), expected in zip(errors, WRONG.values(), strict=True):
         assert file == "wrong.py" and words.startswith(f"error: {expected}")

@@ -78,6 +78,9 @@ Version = Annotated[bool, switch("--version", callback=say_version, is_eager=Tru
 Structure = Annotated[
     bool, switch("--structure", help="Make burns, coasts and touches of a coarse answer legs with free ends.")
 ]
+Impulses = Annotated[
+    str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")
+]
 Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]

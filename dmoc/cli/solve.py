@@ -11,6 +11,7 @@ import typer
 
 from dmoc.cli.options import (
     Hold,
+    Impulses,
     Json,
     Name,
     Order,
@@ -50,6 +51,7 @@ def solve(
         ),
     ] = 1,
     structure: Structure = False,
+    impulses: Impulses = None,
     time_limit: Annotated[
         float | None,
         typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
@@ -77,7 +79,7 @@ def solve(
         with watched(as_json or quiet, unit) as progress:
             numerics = order, steps, tol, hold, None, start, None
             limits = progress, compiled, time_limit
-            solution = dmoc.solve(problem, *numerics, *limits, structure=structure)
+            solution = dmoc.solve(problem, *numerics, *limits, structure=structure, impulses=impulses)
         from dmoc.structure.front import verify
 
         verdict = verify(solution) if solution.optimal else None

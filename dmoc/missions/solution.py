@@ -55,7 +55,7 @@ class MissionSolution:
     own, forces : dict of array
         Unknowns and multipliers of the joints, by their names; see `MissionPath`.
     arcs : tuple
-        If the legs are the arcs of a transfer: what each is, as plain data.
+        What made the legs, as plain data: the arcs of a transfer, or impulses that were added and taken.
     objective, success, status, message, ladder, worst, warnings, tolerance, error, reason, provenance
         As of a `Solution`.
     """

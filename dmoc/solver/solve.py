@@ -33,56 +33,7 @@ def solve(
     compiled: bool = False,
     time_limit: float | None = None,
 ) -> Solution:
-    """Solve a transfer problem, coarse to fine.
-
-    With `structure=True`, by its structure: the burns, coasts, singular arcs, touches of zones and ways along
-    limits of a coarse answer become the legs of a mission with free ends, in each of which nothing switches, so
-    that the full order of the scheme is had. The answer is then a MissionSolution; where that does not succeed,
-    or there is one arc alone, it is as without. `order` and `steps` are then those of the coarse answer.
-
-    Parameters
-    ----------
-    problem : TransferProblem or Mission
-    order : int
-        2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
-        motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
-        the default is 4; from three revolutions on it is 6. For a body that turns it is 4.
-    steps : int
-        Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8, and over many
-        revolutions as many as these need. Or `mesh`: the step ends as increasing fractions 0..1.
-    tol : float
-        Relative error [-] of path and objective to reach instead: mesh, and the order if it is not
-        given, follow from it; `steps` is then where to begin.
-    hold : bool
-        Forces constant over each step.
-    guess
-        Overrides the problem's own guess: function of time, (times, positions), (times, positions, controls),
-        a DiscretePath or a Solution. If the answer costs far more than what the program's own guess leads to
-        on a coarse mesh, a warning says so; a DiscretePath or a Solution of this process is not compared.
-    options : dict
-        CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
-    progress : callable
-        Called every iteration with (order, steps, iteration, objective, row, violation): the worst
-        violated row by name and its scaled size. Return True to stop; an exception
-        that it raises ends the solve and is raised by it.
-    compiled : bool
-        Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
-        once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with
-        several effects and in repeated solves. Without a compiler nothing changes.
-    time_limit : float
-        Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
-        solved: its status is then "time limit", and it is no success.
-
-    Returns
-    -------
-    Solution
-        Whether it succeeded or not; `raise_for_status()` raises if not.
-
-    Raises
-    ------
-    ValueError
-        If an argument has no meaning for this problem.
-    """
+    """Solve a transfer problem, coarse to fine: `dmoc.solve` says what the arguments are."""
     of_kind("problem", problem, TransferProblem)
     scheme(2 if order is None else order)
     hold = flag("hold", hold)

@@ -3,61 +3,199 @@
 from __future__ import annotations
 
 import os
-from functools import wraps
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, overload
 
+from dmoc.basics.arguments import short
 from dmoc.basics.files import as_path
 from dmoc.checks import verification
+from dmoc.checks.verification import Report
+from dmoc.nlp.solving import Progress
 from dmoc.results import solution as transfers
 from dmoc.results.netcdf import format_of
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
 from dmoc.solver import solve as transfer_solver
+
+# What missions are made of is loaded for them alone.
+if TYPE_CHECKING:
+    from dmoc.missions.solution import MissionSolution
+    from dmoc.scene.mission import Mission
 
 # A file of a mission says that it has this format.
 MISSION = "dmoc mission"
 
 
-@wraps(transfer_solver.solve)
-def solve(problem: Any, *given: Any, structure: bool = False, **numerics: Any) -> Any:
-    problem = getattr(problem, "alone", None) or problem
-    if not hasattr(problem, "joints"):
-        found = _by_structure(problem, *given, **numerics) if structure else None
-        return transfer_solver.solve(problem, *given, **numerics) if found is None else found
-    # What solves missions is loaded for them alone.
+@overload
+def solve(
+    problem: TransferProblem,
+    order: int | None = ...,
+    steps: int | None = ...,
+    tol: float | None = ...,
+    hold: bool = ...,
+    mesh: Any = ...,
+    guess: Any = ...,
+    options: dict[str, Any] | None = ...,
+    progress: Progress | None = ...,
+    compiled: bool = ...,
+    time_limit: float | None = ...,
+    *,
+    structure: Literal[False] = ...,
+    impulses: None = ...,
+) -> Solution: ...
+
+
+@overload
+def solve(
+    problem: TransferProblem | Mission,
+    order: int | None = ...,
+    steps: int | None = ...,
+    tol: float | None = ...,
+    hold: bool = ...,
+    mesh: Any = ...,
+    guess: Any = ...,
+    options: dict[str, Any] | None = ...,
+    progress: Progress | None = ...,
+    compiled: bool = ...,
+    time_limit: float | None = ...,
+    *,
+    structure: bool = ...,
+    impulses: str | None = ...,
+) -> Any: ...
+
+
+def solve(
+    problem: TransferProblem | Mission,
+    order: int | None = None,
+    steps: int | None = None,
+    tol: float | None = None,
+    hold: bool = False,
+    mesh: Any = None,
+    guess: Any = None,
+    options: dict[str, Any] | None = None,
+    progress: Progress | None = None,
+    compiled: bool = False,
+    time_limit: float | None = None,
+    *,
+    structure: bool = False,
+    impulses: str | None = None,
+) -> Any:
+    """Solve a transfer problem or a mission, coarse to fine.
+
+    With `structure=True` a transfer is solved by its structure: the burns, coasts, singular arcs, touches of
+    zones and ways along limits of a coarse answer become the legs of a mission with free ends, in each of which
+    nothing switches, so that the full order of the scheme is had. `order` and `steps` are then those of the
+    coarse answer. The answer is a MissionSolution; where that does not succeed, or there is one arc alone, it
+    is as without.
+
+    Parameters
+    ----------
+    problem : TransferProblem or Mission
+    order : int
+        2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
+        motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
+        the default is 4; from three revolutions on it is 6. For a body that turns it is 4.
+    steps : int
+        Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8, and over many
+        revolutions as many as these need. Or `mesh`: the step ends as increasing fractions 0..1. Of a
+        mission the order is 6, and the steps are those of each leg.
+    tol : float
+        Relative error [-] of path and objective to reach instead: mesh, and the order if it is not
+        given, follow from it; `steps` is then where to begin.
+    hold : bool
+        Forces constant over each step.
+    guess
+        Overrides the problem's own guess: function of time, (times, positions), (times, positions, controls),
+        a DiscretePath or a Solution. If the answer costs far more than what the program's own guess leads to
+        on a coarse mesh, a warning says so; a DiscretePath or a Solution of this process is not compared.
+    options : dict
+        CasADi `nlpsol` options, for example {"ipopt.max_iter": 50}.
+    progress : callable
+        Called every iteration with (order, steps, iteration, objective, row, violation): the worst
+        violated row by name and its scaled size. Return True to stop; an exception
+        that it raises ends the solve and is raised by it.
+    compiled : bool
+        Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
+        once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with
+        several effects and in repeated solves. Without a compiler nothing changes.
+    time_limit : float
+        Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
+        solved: its status is then "time limit", and it is no success.
+
+    structure : bool
+        Of a transfer, as above.
+    impulses : "auto", optional
+        Of a mission with impulses: as many as the primer vector asks for, none that is zero.
+
+    Returns
+    -------
+    Solution or MissionSolution
+        Whether it succeeded or not; `raise_for_status()` raises if not.
+
+    Raises
+    ------
+    ValueError
+        If an argument has no meaning for this problem.
+    """
+    stated: Any = getattr(problem, "alone", None) or problem
+    rest = options, progress, compiled, time_limit
+    if impulses not in (None, "auto"):
+        raise ValueError(f"impulses must be 'auto' or not given; got {short(impulses)}")
+    if not hasattr(stated, "joints"):
+        if impulses is not None:
+            raise ValueError("impulses are those of a dmoc.Mission; a transfer has none")
+        found = None
+        if structure:
+            found = _by_structure(stated, order, steps, tol, hold, mesh, guess, rest)
+        return found or transfer_solver.solve(stated, order, steps, tol, hold, mesh, guess, *rest)
     from dmoc.missions.climb import solve_mission
 
-    return solve_mission(problem, *given, **numerics)
+    answer = solve_mission(stated, order, steps, tol, hold, mesh, guess, *rest)
+    if impulses is None:
+        return answer
+    from dmoc.structure.impulses import with_best_impulses
+
+    def again(mission: Mission, path: Any) -> MissionSolution:
+        return solve_mission(mission, order, steps, tol, hold, None, path, *rest)
+
+    return with_best_impulses(answer, again)
 
 
-def _by_structure(problem: Any, *given: Any, **numerics: Any) -> Any:
+def _by_structure(
+    problem: Any, order: Any, steps: Any, tol: Any, hold: bool, mesh: Any, guess: Any, rest: tuple
+) -> Any:
     from dmoc.structure.solve import solve_by_structure
 
-    names = ("order", "steps", "tol", "hold", "mesh", "guess", "options", "progress", "compiled", "time_limit")
-    numerics = dict(zip(names, given, strict=False)) | numerics
-    if numerics.pop("hold", False) or numerics.pop("mesh", None) is not None:
+    if hold or mesh is not None:
         raise ValueError(
             "with structure=True forces are not held and meshes are chosen: give neither hold nor mesh"
         )
-    return solve_by_structure(problem, **numerics)
+    more = dict(zip(("options", "progress", "compiled", "time_limit"), rest, strict=True))
+    return solve_by_structure(problem, order, steps, tol, guess=guess, **more)
 
 
-@wraps(verification.verify)
-def verify(solution: Any, *given: Any, **more: Any) -> Any:
+def verify(
+    solution: Solution | MissionSolution,
+    problem: TransferProblem | Mission | None = None,
+    more: Sequence[Callable] = (),
+) -> Report:
     if not hasattr(solution, "impulses"):
-        return verification.verify(solution, *given, **more)
+        return verification.verify(solution, problem, more)  # type: ignore[arg-type]
     from dmoc.missions.checks import verify_mission
 
-    return verify_mission(solution, *given, **more)
+    return verify_mission(solution, problem, more)  # type: ignore[arg-type]
 
 
-@wraps(transfers.load)
+verify.__doc__ = verification.verify.__doc__
+
+
 def load(path: str | os.PathLike) -> Any:
     if not as_path(path).is_file() or format_of(path) != MISSION:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission
+    from dmoc.structure.solution import as_found
 
-    found = read_mission(path)
-    if not found.arcs:
-        return found
-    from dmoc.structure.solution import structured
+    return as_found(read_mission(path))
 
-    return structured(found)
+
+load.__doc__ = transfers.load.__doc__

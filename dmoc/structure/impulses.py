@@ -10,16 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from dmoc.legs.events import Impulse
-from dmoc.legs.legs import Leg, both_ends
 from dmoc.missions.checks import HELPS, worth_of
 from dmoc.missions.path import MissionPath, cut, merged
 from dmoc.missions.solution import MissionSolution
+from dmoc.scene.impulses import FEWER, MORE, with_impulse, without_impulse
 from dmoc.scene.mission import Mission
+from dmoc.structure.solution import changed_solution
 
 # There are no more than so many impulses.
 MOST_IMPULSES = 8
@@ -27,8 +26,6 @@ MOST_IMPULSES = 8
 FIRST_SIZE = 0.02
 # An impulse below this part of all together is taken away [-].
 NO_SIZE = 1e-5
-# A part of a coast lasts at least this part of it [-].
-LEAST_PART = 1e-4
 # Another impulse must save at least this part of the objective [-].
 WORTH = 1e-7
 
@@ -47,8 +44,9 @@ def with_best_impulses(found: MissionSolution, solve: Callable[..., MissionSolut
         started = _with_another(best)
         if started is None:
             break
-        mission, path = started
-        tried = _without_idle(solve(mission, path), solve)
+        mission, path, index = started
+        tried = _changed(solve(mission, path), best, [MORE, index])
+        tried = _without_idle(tried, solve)
         ladder += tried.ladder
         if not tried.success or tried.objective > (1 - WORTH) * best.objective:
             break
@@ -58,8 +56,13 @@ def with_best_impulses(found: MissionSolution, solve: Callable[..., MissionSolut
     return replace(best, ladder=ladder, reason="; ".join([best.reason, *told]))
 
 
-def _with_another(found: MissionSolution) -> tuple[Mission, MissionPath] | None:
-    """The mission with one more impulse where the primer vector is longest, and a path to start from."""
+def _changed(found: MissionSolution, before: MissionSolution, change: list) -> MissionSolution:
+    """An answer that remembers how its mission came from that of another one."""
+    return changed_solution(found, arcs=(*before.arcs, change))
+
+
+def _with_another(found: MissionSolution) -> tuple[Mission, MissionPath, int] | None:
+    """The mission with one more impulse where the primer vector is longest, a path to start from, the leg."""
     worth = worth_of(found)
     if worth is None:
         return None
@@ -74,44 +77,21 @@ def _with_another(found: MissionSolution) -> tuple[Mission, MissionPath] | None:
         return None
     index, fraction, way = best
     first, last = cut(found.legs[index].path, fraction)
-    mission = _split(found.require_problem(), index)
+    mission = with_impulse(found.require_problem(), index)
     path = found.path
     total = sum(kick.size for kick in found.impulses) or 1.0
     kick = FIRST_SIZE * total * way / np.linalg.norm(way)
     legs = (*path.legs[:index], first, last, *path.legs[index + 1 :])
     begins = (*path.begins[: index + 1], path.begins[index] + first.duration, *path.begins[index + 1 :])
-    own = {
-        _renamed(found.require_problem(), name, lambda i: i + 1 if i > index else i): values
-        for name, values in path.own.items()
-    }
-    return mission, MissionPath(legs, begins, own | {f"joint {index + 1}": kick}, near=True)
+    own = {_renamed(name, lambda i: i + 1 if i > index else i): values for name, values in path.own.items()}
+    return mission, MissionPath(legs, begins, own | {f"joint {index + 1}": kick}, near=True), index
 
 
-def _renamed(mission: Mission, name: str, moved: Callable[[int], int]) -> str:
+def _renamed(name: str, moved: Callable[[int], int]) -> str:
     """The name of a joint after legs were added or taken away."""
     if name in ("start", "goal"):
         return name
     return f"joint {moved(int(name.split()[-1]))}"
-
-
-def _split(mission: Mission, index: int) -> Mission:
-    """The mission with one leg in two parts and an impulse between them, as long together as the leg was."""
-    span = mission.stretches[index].duration
-    part = _part(mission.plan[index], span)
-    places = [i for i, one in enumerate(mission.legs) if isinstance(one, Leg)]
-    like = next((one for one in mission.legs if isinstance(one, Impulse)), Impulse())
-    at = places[index]
-    legs = (*mission.legs[:at], part, like, part, *mission.legs[at + 1 :])
-    sums = [(a + (a > index), b + (b >= index), how) for a, b, how in mission.sums]
-    known = any(a <= index <= b for a, b, _ in mission.sums)
-    more = [] if known else [(index, index + 1, span)]
-    return replace(mission, legs=legs, sums=(*sums, *more))
-
-
-def _part(leg: Leg, span: Any) -> Leg:
-    shortest, longest = both_ends(span)
-    least = min(shortest, LEAST_PART * longest)
-    return replace(leg, duration=(least, longest), steps=None, name="")
 
 
 def _without_idle(found: MissionSolution, solve: Callable[..., MissionSolution]) -> MissionSolution:
@@ -132,31 +112,19 @@ def _without_idle(found: MissionSolution, solve: Callable[..., MissionSolution])
         tried = solve(*_merged(found, idle[0]))
         if not tried.success:
             return found
-        found = tried
+        found = _changed(tried, found, [FEWER, idle[0]])
     return found
 
 
 def _merged(found: MissionSolution, joint: int) -> tuple[Mission, MissionPath]:
     """The mission without the impulse at a joint, and a path to start from."""
     mission, path = found.require_problem(), found.path
-    places = [i for i, one in enumerate(mission.legs) if isinstance(one, Leg)]
-    first, last = places[joint - 1], places[joint]
-    bounds = [mission.stretches[i].duration_bounds for i in (joint - 1, joint)]
-    whole = (bounds[0][0] + bounds[1][0], bounds[0][1] + bounds[1][1])
-    sums = []
-    for a, b, how in mission.sums:
-        if (a, b) == (joint - 1, joint):
-            whole = how
-        else:
-            sums.append((a - (a >= joint), b - (b >= joint), how))
-    leg = replace(mission.plan[joint - 1], duration=whole)
-    legs = (*mission.legs[:first], leg, *mission.legs[last + 1 :])
     one = merged(path.legs[joint - 1], path.legs[joint])
     own = {
-        _renamed(mission, name, lambda i: i - 1 if i > joint else i): values
+        _renamed(name, lambda i: i - 1 if i > joint else i): values
         for name, values in path.own.items()
         if name != f"joint {joint}"
     }
     begins = (*path.begins[:joint], *path.begins[joint + 1 :])
     new = MissionPath((*path.legs[: joint - 1], one, *path.legs[joint + 1 :]), begins, own, near=True)
-    return replace(mission, legs=legs, sums=tuple(sums)), new
+    return without_impulse(mission, joint), new

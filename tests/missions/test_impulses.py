@@ -13,7 +13,6 @@ from dmoc.legs.lambert import lambert
 from dmoc.missions.arcs import cheapest_arc
 from dmoc.missions.path import cut, merged
 from dmoc.scene.problem_file import load_problem
-from dmoc.structure.impulses import with_best_impulses
 
 # Places, duration, whole revolutions, whether about +z, whether the slower one, and both velocities, for
 # mu = 1, by `izzo2015` of lamberthub 1.0.0 (J. Martinez Garrido, 2021) with tolerances of 1e-12.
@@ -196,10 +195,7 @@ def test_no_grid_is_made_where_a_mission_is_no_coast_between_impulses():
 
 
 def from_two(mission):
-    def again(other, guess):
-        return dmoc.solve(other, guess=guess)
-
-    return with_best_impulses(dmoc.solve(mission), again)
+    return dmoc.solve(mission, impulses="auto")
 
 
 def test_the_primer_vector_asks_for_a_third_impulse_and_then_for_none():
@@ -212,6 +208,24 @@ def test_the_primer_vector_asks_for_a_third_impulse_and_then_for_none():
     assert found.objective == pytest.approx(0.7645999702135722, rel=1e-7)
     assert len(found.impulses) == 3 and report.ok
     assert "no further impulse would help" in report["primer"].note
+
+
+def test_a_file_of_added_impulses_is_checked_against_the_mission_as_it_was_stated(tmp_path):
+    whole = load_problem("cw_impulses").make()
+    two = replace(whole, legs=[Impulse(), Coast(whole.duration), Impulse()], duration=None)
+    found = from_two(two)
+    found.save(tmp_path / "more.nc")
+    back = dmoc.load(tmp_path / "more.nc").attach(two)
+    assert len(back.legs) == 2 and back.problem.sums
+    kept = [(one.name, one.value) for one in dmoc.verify(found).checks]
+    assert [(one.name, one.value) for one in dmoc.verify(back).checks] == kept
+
+
+def test_only_missions_take_impulses_and_only_by_themselves():
+    with pytest.raises(ValueError, match="impulses are those of a"):
+        dmoc.solve(load_problem("orbit_raise").make(), impulses="auto")
+    with pytest.raises(ValueError, match="impulses must be 'auto'"):
+        dmoc.solve(load_problem("hohmann").make(), impulses="three")
 
 
 def test_an_end_impulse_that_is_none_becomes_a_coast_before_the_first():
