@@ -71,9 +71,9 @@ def local_optima(
 ) -> list[Optimum]:
     """The distinct optima that `starts` guesses lead to, the best first.
 
-    The guesses are the default one, then for a body that turns the turn the other way round, on links each
-    hinge and rod the other way round and two of them at a time, with a lone attractor more and fewer
-    revolutions, with keep-out zones paths that bend around each on either side, then random bends. The same
+    The guesses are the default one, then for a body that turns the turn the other way round, with zones paths
+    that bend around each on either side, on links each hinge and rod the other way round and two of them at a
+    time, with a lone attractor more and fewer revolutions, then random bends. The same
     numbers are drawn every time.
     """
     base = first_path(problem, order, None, hold, guess)
@@ -151,10 +151,11 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
     if problem.inertia is not None:
         yield from _turns(problem, base)
         return
-    if problem.links or problem.system is not None:
+    if linked := bool(problem.links or problem.system is not None):
         # What leads bodies on links is loaded for those alone.
         from dmoc.links.along import other_ways
 
+        yield from ways_past(problem, base)
         for name, position in other_ways(problem, base.fractions):
             yield name, replace(base, position=position)
     lone = problem.attraction.lone
@@ -166,7 +167,8 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
             turned = center + turned_around(base.position - center, turns * base.fractions)
             position = windings[0][0](base.fractions) if windings else turned
             yield f"{turns:+d} revolutions", replace(base, position=position)
-    yield from ways_past(problem, base)
+    if not linked:
+        yield from ways_past(problem, base)
     # The seed is fixed: a second run must find the same optima.
     draw = np.random.default_rng(0)
     extent = float(np.linalg.norm(np.ptp(base.position, axis=0))) or 1.0

@@ -133,6 +133,7 @@ def test_what_cannot_be_filmed_is_told(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_command_line_writes_one_and_says_so(tmp_path):
     path = tmp_path / "flight.gif"
     command = [sys.executable, "-m", "dmoc.cli", "solve", "point_to_point", "--animate"]

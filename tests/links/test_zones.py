@@ -140,6 +140,7 @@ def test_the_tip_of_an_arm_goes_past_a_ball(passed):
     assert free.objective < 0.5 * passed.objective
 
 
+@pytest.mark.slow
 def test_starts_lead_past_the_ball_on_both_sides_with_the_arm_whole(passed):
     optima = local_optima(reach(), 3)
     sides = [one for one in optima if any("side of KeepOut 1 of fore" in start for start in one.starts)]

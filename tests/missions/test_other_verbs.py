@@ -91,6 +91,7 @@ def planets(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_porkchop_map_is_swept_drawn_and_taken_up_again(planets, capsys):
     grid = "--vary", "departure=0,2,14", "--vary", "flight=2.5:4.5:3"
     code, said = run(capsys, "sweep", "planets.py", *grid, "--out", "map.nc")
