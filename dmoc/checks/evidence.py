@@ -22,7 +22,7 @@ from dmoc.motion.momenta import (
     velocity_along,
     without_reactions,
 )
-from dmoc.motion.scales import Scales, least_extent, path_scales, wheel_momentum
+from dmoc.motion.scales import LEAST_TURN, Scales, least_extent, path_scales, wheel_momentum
 from dmoc.results.solution import Solution, reported
 from dmoc.scene.problem import TransferProblem
 
@@ -240,6 +240,9 @@ class Evidence:
         """The torque that errors are judged by [N m]: of the actuator, of the scene, or what turns the body."""
         pulled = [np.abs(load[:, self.rates]).max(initial=0.0) for load in self.loads]
         scene = float(self.mass.max()) * max(*pulled, self.spin / self.path.duration)
+        if self.rate * self.path.duration <= LEAST_TURN:
+            # Of a body that does not turn a force on a lever says how large a torque is.
+            scene = max(scene, self.typical_force * self.extent)
         return max(self.problem.actuator.torque_limit() or 0.0, self.largest_torque, 1e-3 * scene) or 1.0
 
     @cached_property

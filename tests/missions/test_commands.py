@@ -55,7 +55,8 @@ def run(capsys, *arguments):
 def test_a_mission_is_solved_saved_drawn_checked_and_drawn_again(folder, capsys):
     code, said = run(capsys, "solve", "hohmann.py", "--out", "flight.nc", "--plot", "flight.png")
     assert code == SOLVED and "delta v 0.284456" in said.out
-    assert "Impulses" in said.out and "no further impulse would help" in said.out
+    words = " ".join(said.out.split())
+    assert "Impulses" in words and "no further impulse would help" in words
     assert (folder / "flight.png").stat().st_size > 1000
     code, said = run(capsys, "check", "flight.nc")
     assert code == SOLVED and "primer" in said.out and "joints" in said.out
@@ -133,7 +134,9 @@ def test_a_time_limit_ends_a_mission_with_the_last_mesh_that_was_solved(folder, 
     monkeypatch.setattr(climb.Climb, "attempt", counted)
     monkeypatch.setattr(Interrupt, "late", property(over))
     code, said = run(capsys, "solve", "hohmann.py", "--tol", "1e-11", "--time-limit", "60")
-    assert code == CHECK_FAILED and "this is the answer on the last mesh that was solved" in said.out
+    assert code == CHECK_FAILED and "this is the answer on the last mesh that was solved" in " ".join(
+        said.out.split()
+    )
     assert len(solved) == 3 and solved[-1].answer.status == "stopped"
     late["after"] = 0
     solved.clear()

@@ -26,6 +26,7 @@ def hohmann(limit):
     return Mission(1.0, *ends, legs, [PointGravity(1.0)], objective=DeltaV())
 
 
+@pytest.mark.slow
 def test_the_force_limit_of_a_leg_is_named_with_one_that_is_enough():
     failed = solve(gates(3.0))
     assert not failed.success and failed.worst

@@ -50,7 +50,7 @@ RECORD = {
 MISSIONS = {
     "bielliptic": 55,
     "cw_impulses": 23,
-    "delta_iii": 42,
+    "delta_iii": 24,
     "gates": 7,
     "halo_orbit": 6,
     "hohmann": 14,
