@@ -184,6 +184,7 @@ def test_a_leap_between_two_nodes_is_seen_by_the_body_that_leaps():
     assert names == ["KeepOut 1 of bob between nodes"]
 
 
+@pytest.mark.slow
 def test_what_is_too_tight_is_told_with_the_body():
     found = solve(hung([SpeedLimit(0.5, on="bob")]), order=4, steps=25)
     assert not found.success
@@ -194,6 +195,7 @@ def test_what_is_too_tight_is_told_with_the_body():
     assert 0.95 * needed < np.linalg.norm(enough.of("bob")[1], axis=1).max() < 1.01 * needed
 
 
+@pytest.mark.slow
 def test_words_pictures_and_files_have_the_limits(passed, tmp_path):
     from dmoc import load
 

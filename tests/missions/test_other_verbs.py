@@ -107,6 +107,7 @@ def test_a_porkchop_map_is_swept_drawn_and_taken_up_again(planets, capsys):
     assert code == 0 and (planets / "map.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_a_sweep_of_missions_goes_on_where_it_was(planets, capsys, monkeypatch):
     from dmoc.sweeps.sweep import sweep
 

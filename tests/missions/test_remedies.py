@@ -51,6 +51,7 @@ def test_rows_that_contradict_each_other_are_named_by_joint():
     assert "cannot be met together: joint 1.via" in failed.message
 
 
+@pytest.mark.slow
 def test_what_was_asked_stands_in_the_ladder():
     failed = solve(gates(3.0))
     assert [level.question for level in failed.ladder if level.question]

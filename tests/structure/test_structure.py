@@ -76,6 +76,7 @@ def test_a_way_along_a_limit(order, steps):
     assert dmoc.verify(found).ok
 
 
+@pytest.mark.slow
 def test_a_halo_orbit_left_and_another_reached():
     found = dmoc.solve(gallery("halo_transfer"), structure=True)
     assert found.success and len(found.legs) == 7
@@ -130,6 +131,7 @@ def test_a_dozen_coarse_meshes_lead_to_the_same_digits(name, values, meshes):
     assert dict(zip(meshes, errors, strict=True)) == pytest.approx(dict.fromkeys(meshes, 0.0), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "steps"), [(2, (40, 80)), (4, (8, 16)), (6, (4, 8)), (8, (3, 6))])
 def test_the_order_of_the_scheme_across_free_switches(order, steps):
     exact = dmoc.solve(gallery("two_body_fuel"), tol=1e-10, structure=True)
