@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.arguments import whole
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
@@ -28,6 +27,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
 from dmoc.solver.meshes import WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
+from dmoc.solver.solve import check_numerics
 
 # An attempt from a guess ends after this many iterations.
 MOST_TRYING = 200
@@ -99,10 +99,8 @@ class Climb:
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
             raise watch.error
-        steps = sum(len(leg.program.mesh) - 1 for leg in program.legs)
         level = Level(
-            max(leg.program.scheme.order for leg in program.legs),
-            steps,
+            *program.numerics,
             answer.iterations,
             mission.objective.sense * answer.objective * program.cost,
             built,
@@ -118,11 +116,9 @@ class Climb:
     def _watch(self, program: MissionProgram) -> Watch:
         def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
             cost = self.mission.objective.sense * objective * program.cost
-            orders = max(leg.program.scheme.order for leg in program.legs)
-            steps = sum(len(leg.program.mesh) - 1 for leg in program.legs)
             worst = program.worst(x.ravel(), g.ravel(), 1)
             name, size = (program.name_of(*worst[0][1:]), worst[0][0]) if worst else ("", 0.0)
-            return bool(self.progress(orders, steps, iteration, cost, name, size))
+            return bool(self.progress(*program.numerics, iteration, cost, name, size))
 
         return Watch(*program.sizes, tell if self.progress else None, self.interrupt)
 
@@ -132,12 +128,11 @@ class Climb:
         tried = self._staged(path, stages)
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
-        best = tried
         for factor in OTHER_DURATIONS:
             other = self._staged(stretched(self.mission, path, factor), stages)
             if other.solved or other.answer.status == "stopped":
                 return other
-        return best
+        return tried
 
     def explained(self, path: MissionPath, failed: Attempt) -> Attempt:
         """A failed attempt; or the answer from a path that the search for the cause finds."""
@@ -189,11 +184,9 @@ class Climb:
 
         Without a tolerance the steps of a leg are to err by no more than `accurate` in sum.
         """
-        error, changes = None, []
+        error, changes, errors = None, [], self._errors(attempt)
         for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
-            errors = self._errors(attempt)
-            worst = max(float(each.sum()) for each in errors)
-            if tol is None and worst <= accurate:
+            if tol is None and _largest(errors) <= accurate:
                 break
             onto = attempt.path.onto(finer(attempt.path, errors))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
@@ -206,9 +199,9 @@ class Climb:
             if not found.solved:
                 break
             changes.append(_change(attempt, found))
-            attempt = found
+            attempt, errors = found, self._errors(found)
             if tol is not None:
-                error = self._error(attempt, changes)
+                error = self._error(attempt, changes, _largest(errors))
                 self.levels[-1] = replace(self.levels[-1], error=error.largest)
                 if error.largest <= tol:
                     return attempt, error, True
@@ -216,14 +209,14 @@ class Climb:
 
     def largest_error(self, attempt: Attempt) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
-        return max(float(each.sum()) for each in self._errors(attempt))
+        return _largest(self._errors(attempt))
 
-    def _error(self, attempt: Attempt, changes: list[float]) -> Error:
+    def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
         path, missed = attempt.path, 0.0
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
-        return Error(self.largest_error(attempt), _left(changes), missed)
+        return Error(summed, _left(changes), missed)
 
     def _errors(self, attempt: Attempt) -> list[np.ndarray]:
         path = attempt.path
@@ -247,8 +240,7 @@ def solve_mission(
     time_limit: float | None = None,
 ) -> MissionSolution:
     """Solve a mission; the arguments are those of `dmoc.solve`, and `steps` are those of each leg."""
-    if steps is not None:
-        whole("steps", steps, least=2)
+    check_numerics(order, steps, tol, hold, options, progress, time_limit)
     if mesh is not None:
         raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
     climb = Climb(mission, options, progress, compiled, time_limit)
@@ -275,6 +267,10 @@ def first_path(mission: Mission, order: int | None, steps: int | None, hold: boo
     counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
     path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
     return path.onto(meshes_along(mission, path, order, steps))
+
+
+def _largest(errors: list[np.ndarray]) -> float:
+    return max(float(each.sum()) for each in errors)
 
 
 def _change(coarse: Attempt, fine: Attempt) -> float:

@@ -119,6 +119,12 @@ class MissionProgram:
         columns = last.columns + last.program.columns.size + sum(layout.size for layout, _ in self.own.values())
         return columns, self.first_row + self.rows.size, parameters + len(self._parameters_of(-1))
 
+    @property
+    def numerics(self) -> tuple[int, int]:
+        """The largest order among the legs, and the steps of all."""
+        orders = max(leg.program.scheme.order for leg in self.legs)
+        return orders, sum(len(leg.program.mesh) - 1 for leg in self.legs)
+
     def column_scales(self) -> np.ndarray:
         """Scale of every unknown."""
         parts = [leg.program.columns.scales() for leg in self.legs]

@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.basics.files import AGAIN
 from dmoc.missions.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.netcdf import Format, Table, as_array, one_line, read_table, write_table
-from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution, SolveError
-from dmoc.results.table import solution_of, solution_parts
+from dmoc.results.netcdf import Format, Table, as_array, damage_told, read_table, write_table
+from dmoc.results.solution import Outcome, Solution
+from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
 from dmoc.scene.mission import Mission
 
 # The name and version by which a file of a mission is known.
@@ -40,7 +39,7 @@ class Kick(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MissionSolution:
+class MissionSolution(Outcome):
     """The answer to a mission, whether it succeeded or not.
 
     Attributes
@@ -78,11 +77,6 @@ class MissionSolution:
     reason: str = ""
     arcs: tuple[list[Any], ...] = ()
     provenance: Provenance = field(kw_only=True)
-
-    @property
-    def optimal(self) -> bool:
-        """Whether the path is a local optimum, be it as accurate as asked for or not."""
-        return self.success or self.status in (NOT_MET, OUT_OF_TIME)
 
     @property
     def path(self) -> MissionPath:
@@ -131,22 +125,6 @@ class MissionSolution:
         return None if found[0] is None else np.concatenate([each for each in found if each is not None])
 
     @property
-    def iterations(self) -> int:
-        return sum(level.iterations for level in self.ladder)
-
-    @property
-    def evaluations(self) -> int:
-        return sum(level.evaluations for level in self.ladder)
-
-    @property
-    def build_s(self) -> float:
-        return sum(level.build_s for level in self.ladder)
-
-    @property
-    def solve_s(self) -> float:
-        return sum(level.solve_s for level in self.ladder)
-
-    @property
     def velocity_change(self) -> float:
         """Sum of all impulses [m/s]."""
         return sum(kick.size for kick in self.impulses)
@@ -161,12 +139,6 @@ class MissionSolution:
         axes = self.dimension
         sizes = [np.linalg.norm(leg.costate[:, :axes], axis=1) for leg in self.legs]
         return self.time, np.concatenate(sizes)
-
-    def raise_for_status(self) -> MissionSolution:
-        """Itself if the solve succeeded; else SolveError."""
-        if not self.success:
-            raise SolveError(f"{self.status}: {self.message}")
-        return self
 
     def require_problem(self) -> Mission:
         """The mission; ValueError if it was loaded from a file and none has been attached since."""
@@ -209,12 +181,8 @@ class MissionSolution:
 def read_mission(path: str | os.PathLike, make: Callable = Solution) -> MissionSolution:
     """The solution of a mission in a file, without its mission."""
     facts, table = read_table(path, MISSION_FILE)
-    try:
+    with damage_told(path):
         return _read(facts, table, make)
-    except KeyError as error:
-        raise ValueError(f"{path} is damaged: it lacks the attribute {error}; {AGAIN}") from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise ValueError(f"{path} is damaged: {one_line(error)}; {AGAIN}") from None
 
 
 def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
@@ -264,33 +232,13 @@ def _read(facts: dict[str, Any], table: Table, make: Callable) -> MissionSolutio
         for joint, time, place, change in json.loads(facts["impulses"])
     ]
     return MissionSolution(
-        None,
-        tuple(legs),
-        tuple(kicks),
-        joints["own"],
-        joints["forces"],
-        float(facts["objective"]),
-        float(facts["final_mass"]),
-        bool(facts["success"]),
-        str(facts["status"]),
-        str(facts["message"]),
-        tuple(Level(**level) for level in json.loads(facts["ladder"])),
-        tuple((str(name), float(size), str(unit)) for name, size, unit in json.loads(facts["worst"])),
-        tuple(map(str, json.loads(facts["warnings"]))),
-        json.loads(facts["tolerance"]),
-        Error(**error) if (error := json.loads(facts["error"])) else None,
-        str(facts["reason"]),
-        tuple(json.loads(facts["arcs"])),
-        provenance=Provenance(
-            str(facts["problem"]),
-            json.loads(facts["parameters"]),
-            float(facts["start_time"]),
-            str(facts["objective_unit"]),
-            (),
-            (),
-            json.loads(facts["options"]),
-            str(facts["source_hash"]),
-            json.loads(facts["versions"]),
-            str(facts["created"]),
-        ),
+        problem=None,
+        legs=tuple(legs),
+        impulses=tuple(kicks),
+        own=joints["own"],
+        forces=joints["forces"],
+        final_mass=float(facts["final_mass"]),
+        **outcome_fields(facts),
+        arcs=tuple(json.loads(facts["arcs"])),
+        provenance=provenance_of(facts),
     )

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,6 +71,17 @@ def read_table(path: str | os.PathLike, form: Format) -> tuple[dict[str, Any], T
     if facts["format_version"] > 1 and not whole:
         raise ValueError(f"{file} was cut short or changed: it lacks its checksum; {AGAIN}")
     return facts, table
+
+
+@contextmanager
+def damage_told(path: str | os.PathLike) -> Iterator[None]:
+    """What is wrong with the content of a file that could be opened becomes a ValueError of one line."""
+    try:
+        yield
+    except KeyError as error:
+        raise ValueError(f"{path} is damaged: it lacks the attribute {error}; {AGAIN}") from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ValueError(f"{path} is damaged: {one_line(error)}; {AGAIN}") from None
 
 
 def format_of(path: str | os.PathLike) -> str | None:

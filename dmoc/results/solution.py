@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,8 +24,54 @@ class SolveError(RuntimeError):
     """Raised by `Solution.raise_for_status` when the optimisation failed."""
 
 
+class Outcome:
+    """What the solutions of transfers and of missions have in common: how the solve ended, and its effort."""
+
+    success: bool
+    status: str
+    message: str
+    ladder: tuple[Level, ...]
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the path is a local optimum, be it as accurate as asked for or not."""
+        return self.success or self.status in (NOT_MET, OUT_OF_TIME)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of Ipopt on all meshes."""
+        return sum(level.iterations for level in self.ladder)
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of functions and derivatives on all meshes."""
+        return sum(level.evaluations for level in self.ladder)
+
+    @property
+    def build_s(self) -> float:
+        """Seconds spent on building NLPs."""
+        return sum(level.build_s for level in self.ladder)
+
+    @property
+    def solve_s(self) -> float:
+        """Seconds spent in Ipopt."""
+        return sum(level.solve_s for level in self.ladder)
+
+    def raise_for_status(self) -> Self:
+        """Itself if the solve succeeded.
+
+        Raises
+        ------
+        SolveError
+            With what failed and what to try.
+        """
+        if not self.success:
+            raise SolveError(f"{self.status}: {self.message}")
+        return self
+
+
 @dataclass(frozen=True)
-class Solution:
+class Solution(Outcome):
     """The answer to a transfer problem on the last mesh, whether it succeeded or not.
 
     Attributes
@@ -88,11 +134,6 @@ class Solution:
     wheel_momentum: np.ndarray | None = None
     wheel_torque: np.ndarray | None = None
     provenance: Provenance = field(kw_only=True)
-
-    @property
-    def optimal(self) -> bool:
-        """Whether the path is a local optimum, be it as accurate as asked for or not."""
-        return self.success or self.status in (NOT_MET, OUT_OF_TIME)
 
     @property
     def order(self) -> int:
@@ -168,38 +209,6 @@ class Solution:
     @property
     def costate(self) -> np.ndarray:
         return self.path.multipliers[COSTATE]
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of Ipopt on all meshes."""
-        return sum(level.iterations for level in self.ladder)
-
-    @property
-    def evaluations(self) -> int:
-        """Evaluations of functions and derivatives on all meshes."""
-        return sum(level.evaluations for level in self.ladder)
-
-    @property
-    def build_s(self) -> float:
-        """Seconds spent on building NLPs."""
-        return sum(level.build_s for level in self.ladder)
-
-    @property
-    def solve_s(self) -> float:
-        """Seconds spent in Ipopt."""
-        return sum(level.solve_s for level in self.ladder)
-
-    def raise_for_status(self) -> Solution:
-        """Itself if the solve succeeded.
-
-        Raises
-        ------
-        SolveError
-            With what failed and what to try.
-        """
-        if not self.success:
-            raise SolveError(f"{self.status}: {self.message}")
-        return self
 
     def require_problem(self) -> TransferProblem:
         """The problem.

@@ -21,11 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.files import AGAIN
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import COSTATE, DiscretePath, Key
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.netcdf import Format, Table, as_array, one_line, read_table, write_table
+from dmoc.results.netcdf import Format, Table, as_array, damage_told, read_table, write_table
 from dmoc.results.turning import turning_fields, turning_path, turning_shapes, turning_variables
 
 # The name and version by which a file of this kind is known, its description, and the remedy where it is none.
@@ -68,12 +67,8 @@ def solution_of(facts: dict[str, Any], table: Table, make: Callable) -> Any:
 def read(path: str | os.PathLike, make: Callable) -> Any:
     """The solution in a file, without its problem; `make` takes the arguments of Solution."""
     facts, table = read_table(path, SOLUTION_FILE)
-    try:
+    with damage_told(path):
         return solution_of(facts, table, make)
-    except KeyError as error:
-        raise ValueError(f"{path} is damaged: it lacks the attribute {error}; {AGAIN}") from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise ValueError(f"{path} is damaged: {one_line(error)}; {AGAIN}") from None
 
 
 def to_dataset(solution: Any) -> Any:
@@ -116,25 +111,32 @@ def _variables(solution: Any) -> Table:
 def _solution(facts: dict[str, Any], table: Table, make: Callable) -> Any:
     """The solution in a file's attributes and variables."""
     return make(
-        None,
-        _path(facts, table),
-        as_array(table, "velocity"),
-        as_array(table, "momentum"),
-        as_array(table, "force"),
-        float(facts["objective"]),
-        bool(facts["success"]),
-        str(facts["status"]),
-        str(facts["message"]),
-        tuple(Level(**level) for level in json.loads(facts["ladder"])),
-        tuple((str(name), float(size), str(unit)) for name, size, unit in json.loads(facts["worst"])),
-        # Files that were written before there were warnings have none.
-        warnings=tuple(map(str, json.loads(facts.get("warnings", "[]")))),
-        tolerance=json.loads(facts["tolerance"]),
-        error=Error(**error) if (error := json.loads(facts["error"])) else None,
-        reason=str(facts["reason"]),
+        problem=None,
+        path=_path(facts, table),
+        velocity=as_array(table, "velocity"),
+        momentum=as_array(table, "momentum"),
+        force=as_array(table, "force"),
+        **outcome_fields(facts),
         **turning_fields(table),
-        provenance=_provenance(facts, table),
+        provenance=provenance_of(facts, tuple(str(label) for label in table["channel"][1])),
     )
+
+
+def outcome_fields(facts: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a solution, of a transfer or of a mission, on how the solve ended."""
+    return {
+        "objective": float(facts["objective"]),
+        "success": bool(facts["success"]),
+        "status": str(facts["status"]),
+        "message": str(facts["message"]),
+        "ladder": tuple(Level(**level) for level in json.loads(facts["ladder"])),
+        "worst": tuple((str(row), float(size), str(unit)) for row, size, unit in json.loads(facts["worst"])),
+        # Files that were written before there were warnings have none.
+        "warnings": tuple(map(str, json.loads(facts.get("warnings", "[]")))),
+        "tolerance": json.loads(facts["tolerance"]),
+        "error": Error(**error) if (error := json.loads(facts["error"])) else None,
+        "reason": str(facts["reason"]),
+    }
 
 
 def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
@@ -156,13 +158,14 @@ def _path(facts: dict[str, Any], table: Table) -> DiscretePath:
     )
 
 
-def _provenance(facts: dict[str, Any], table: Table) -> Provenance:
+def provenance_of(facts: dict[str, Any], control_labels: tuple[str, ...] = ()) -> Provenance:
+    """Where a solution comes from, from the attributes of its file."""
     return Provenance(
         str(facts["problem"]),
         json.loads(facts["parameters"]),
         float(facts["start_time"]),
         str(facts["objective_unit"]),
-        tuple(str(label) for label in table["channel"][1]),
+        control_labels,
         tuple(json.loads(facts["control_units"])),
         json.loads(facts["options"]),
         str(facts["source_hash"]),

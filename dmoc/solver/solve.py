@@ -35,22 +35,11 @@ def solve(
 ) -> Solution:
     """Solve a transfer problem, coarse to fine: `dmoc.solve` says what the arguments are."""
     of_kind("problem", problem, TransferProblem)
-    scheme(2 if order is None else order)
-    hold = flag("hold", hold)
-    if options is not None and not all(isinstance(name, str) for name in of_kind("options", options, dict)):
-        raise ValueError(f"options must have names such as 'ipopt.max_iter'; got {short(options)}")
-    if steps is not None:
-        whole("steps", steps, least=2)
-    if progress is not None and not callable(progress):
-        raise ValueError(f"progress must be a function; got {short(progress)}")
-    if time_limit is not None:
-        number("time_limit", time_limit, "s", positive=True)
+    check_numerics(order, steps, tol, hold, options, progress, time_limit)
     problem = followed(problem, problem.guess if guess is None else guess)
     ladder = Ladder(problem, options, progress, compiled, time_limit)
-    if tol is not None:
-        if mesh is not None:
-            raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
-        tol = _tolerance(tol)
+    if tol is not None and mesh is not None:
+        raise ValueError("give mesh or tol, not both: to meet a tolerance the mesh is chosen")
     ladder.holds = lambda other: holds(
         ladder, other, lambda trial: _solved(trial, order, steps, None, hold, mesh, guess)
     )
@@ -97,8 +86,19 @@ def _solved(
     return ladder.solution(rung)
 
 
-def _tolerance(value: Any) -> float:
-    tol = number("tol", value, "-", positive=True)
-    if not 1e-11 <= tol <= 0.1:
+def check_numerics(
+    order: Any, steps: Any, tol: Any, hold: Any, options: Any, progress: Any, time_limit: Any
+) -> None:
+    """Raise ValueError if an argument of a solve, of a transfer or of a mission, has no meaning."""
+    scheme(2 if order is None else order)
+    flag("hold", hold)
+    if options is not None and not all(isinstance(name, str) for name in of_kind("options", options, dict)):
+        raise ValueError(f"options must have names such as 'ipopt.max_iter'; got {short(options)}")
+    if steps is not None:
+        whole("steps", steps, least=2)
+    if tol is not None and not 1e-11 <= number("tol", tol, "-", positive=True) <= 0.1:
         raise ValueError(f"tol must lie between 1e-11 and 0.1 [-]; got {tol:g}")
-    return tol
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress must be a function; got {short(progress)}")
+    if time_limit is not None:
+        number("time_limit", time_limit, "s", positive=True)

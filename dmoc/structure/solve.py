@@ -19,7 +19,7 @@ from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import first_path
-from dmoc.solver.solve import solve
+from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
@@ -62,6 +62,7 @@ def solve_by_structure(
     `order` and `steps` are those of the coarse answer, `more` are further arguments of `dmoc.solve`. The
     independent checks judge the result. What was found when the user or the time ended it is told as it is.
     """
+    check_numerics(order, steps, tol, False, more.get("options"), more.get("progress"), more.get("time_limit"))
     if not can_be_parted(problem):
         return None
     coarse = coarse_answer(problem, order, steps, **more)

@@ -319,6 +319,24 @@ def test_what_has_no_meaning_is_refused_in_one_line(change, words):
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"order": 3}, "order must be one of 2, 4, 6, 8"),
+        ({"steps": 1}, "steps must be a whole number of at least 2"),
+        ({"tol": 5.0}, "tol must lie between"),
+        ({"hold": 3}, "hold must be True or False"),
+        ({"mesh": [0, 0.5, 1]}, "a mission has a mesh for each leg"),
+        ({"options": 3}, "options must be a dict"),
+        ({"progress": 4}, "progress must be a function"),
+        ({"time_limit": -1}, "time_limit must be greater than 0"),
+    ],
+)
+def test_numerics_without_a_meaning_are_refused_as_of_a_transfer(given, words):
+    with pytest.raises(ValueError, match=words):
+        dmoc.solve(gates(), **given)
+
+
 def test_a_mission_that_cannot_be_is_reported_with_its_leg():
     mission = replace(gates(False), actuator=BallForce(1.0))
     found = dmoc.solve(mission)
