@@ -10,6 +10,7 @@ import numpy as np
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.mesh import node_weights
 from dmoc.nlp.placement import Placement
+from dmoc.nlp.program import Program
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import units_of
@@ -58,24 +59,30 @@ def stationarity(evidence: Evidence) -> Stationarity:
     lbx, ubx, lbg, ubg = nlp.bounds(evidence.problem)
     slope, rows, cost = _evaluate(blocks, nlp, x, p, lam_g)
     slope = slope + lam_x
-    weights = {"node": node_weights(nlp.mesh, nlp.scheme), "step": np.diff(nlp.mesh)}
-    weights["control"] = weights["step" if nlp.hold else "node"]
-    # Errors of the costate add up along the path, so sums from the start on are judged, not single entries.
-    along = [group.of(slope) for group in nlp.columns.groups if group.kind != "control"]
-    force = nlp.columns["force"]
-    idle = [
-        _idle(layout, multipliers, values, lower, upper, weights)
-        for layout, multipliers, values, lower, upper in (
-            (nlp.columns, lam_x, x, lbx, ubx),
-            (nlp.rows, lam_g, rows, lbg, ubg),
-        )
-    ]
+    force, path, limits = left_over(
+        nlp, slope, ((nlp.columns, lam_x, x, lbx, ubx), (nlp.rows, lam_g, rows, lbg, ubg))
+    )
     stated = evidence.solution.objective * evidence.problem.objective.sense / nlp.units.cost
-    return Stationarity(
-        float(np.abs(force.of(slope) / _not_tiny(weights["control"], SHORT)).max(initial=0.0)),
+    return Stationarity(force, path, limits, float(abs(cost - stated)))
+
+
+def left_over(program: Program, slope: np.ndarray, sides: tuple) -> tuple[float, float, float]:
+    """What is left of the conditions on controls, on the path and on limits that do not act [-].
+
+    `slope` is the scaled gradient of the Lagrangian by the unknowns of a program, `sides` are its layouts of
+    unknowns and of rows, each with multipliers, values, lower and upper bounds.
+    """
+    weights = {"node": node_weights(program.mesh, program.scheme), "step": np.diff(program.mesh)}
+    weights["control"] = weights["step" if program.hold else "node"]
+    # Errors of the costate add up along the path, so sums from the start on are judged, not single entries.
+    along = [group.of(slope) for group in program.columns.groups if group.kind != "control"]
+    force = program.columns["force"].of(slope)
+    if force.size:
+        force = force / _not_tiny(weights["control"], SHORT)
+    return (
+        float(np.abs(force).max(initial=0.0)),
         float(np.max([np.abs(np.cumsum(part, axis=0)).max(initial=0.0) for part in along])),
-        float(np.max(idle)),
-        float(abs(cost - stated)),
+        float(np.max([idle(*side, weights=weights) for side in sides])),
     )
 
 
@@ -125,7 +132,7 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
     return slope * nlp.columns.scales() / nlp.units.cost, rows * nlp.rows.scales(), cost / nlp.units.cost
 
 
-def _idle(layout: Any, multipliers, values, lower, upper, weights: dict) -> float:
+def idle(layout: Any, multipliers: Any, values: Any, lower: Any, upper: Any, *, weights: dict) -> float:
     """Largest multiplier times the distance from its limit, as a density in time.
 
     Steps shorter than the mean count as the mean. The barrier leaves the same product at every limit, which

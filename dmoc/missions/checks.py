@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.checks.evidence import Evidence
+from dmoc.checks.optimality import idle, left_over
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
@@ -119,36 +120,29 @@ class _Whole:
 
     def optimality(self) -> Check:
         """First-order conditions of the mission, and whether the objective is the cost of the path."""
-        program, lbx_ubx = self.program, self.program.bounds()
-        left, limits = 0.0, 0.0
+        program, (lbx, ubx, lbg, ubg) = self.program, self.program.bounds()
+        found = []
         for placed in program.legs:
-            layout = placed.program.columns
-            mine = self.slope[placed.columns : placed.columns + layout.size]
-            for group in layout.groups:
-                part = group.of(mine)
-                if group.kind == "control":
-                    weights = np.maximum(
-                        np.gradient(np.linspace(0, 1, max(group.count, 2)))[: group.count], 1e-3
-                    )
-                    left = max(left, float(np.abs(part / weights[:, None]).max(initial=0.0)))
-                else:
-                    left = max(left, float(np.abs(np.cumsum(part, axis=0)).max(initial=0.0)))
+            one = placed.program
+            mine = slice(placed.columns, placed.columns + one.columns.size)
+            rows = slice(placed.rows, placed.rows + one.rows.size)
+            sides = (
+                (one.columns, *(part[mine] for part in (self.lam_x, self.x, lbx, ubx))),
+                (one.rows, *(part[rows] for part in (self.lam_g, self.rows, lbg, ubg))),
+            )
+            found.append(left_over(one, self.slope[mine], sides))
+        force, path, limits = (max(side) for side in zip(*found, strict=True))
         # Of an impulse that is none the primer vector says whether it may be one.
-        rest = np.delete(self.slope, program.idle_places())
-        rest = rest[program.legs[-1].columns + program.legs[-1].program.columns.size :]
-        left = max(left, float(np.abs(rest).max(initial=0.0)))
-        for multipliers, values, lower, upper in (
-            (self.lam_x, self.x, *lbx_ubx[:2]),
-            (self.lam_g, self.rows, *lbx_ubx[2:]),
-        ):
-            room = np.where(multipliers > 0, upper - values, values - lower)
-            product = np.abs(multipliers) * np.clip(room, 0.0, 1.0)
-            product[lower == upper] = 0.0
-            limits = max(limits, float(product.max(initial=0.0)))
+        none = set(program.idle_places())
+        own = [i for i in range(mine.stop, len(self.slope)) if i not in none]
+        path = max(path, float(np.abs(self.slope[own]).max(initial=0.0)))
+        if program.rows.size:
+            joints = (part[program.first_row :] for part in (self.lam_g, self.rows, lbg, ubg))
+            limits = max(limits, idle(program.rows, *joints, weights={}))
         sense = self.solution.require_problem().objective.sense
         stated = abs(self.cost - sense * self.solution.objective) / program.cost
-        note = f"path and control {left:.0e}, limits {limits:.0e}, objective {stated:.0e}"
-        return Check.of("optimality", max(left, limits, stated), OPTIMALITY, "-", note)
+        note = f"control {force:.0e}, costate {path:.0e}, limits {limits:.0e}, objective {stated:.0e}"
+        return Check.of("optimality", max(force, path, limits, stated), OPTIMALITY, "-", note)
 
 
 def primer_check(solution: MissionSolution) -> Check:

@@ -210,16 +210,32 @@ def meshes_along(
     for leg, problem, mine in zip(mission.plan, mission.stretches, path.legs, strict=True):
         this = leg.order or order or ORDER
         count = leg.steps or steps
-        rates = problem.attraction.rates(mine.place)
-        at = mine.fractions
-        angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(at)))
-        turns = angles[-1] * mine.duration / (2 * np.pi)
-        if count is None:
-            have = (len(mine.mesh) - 1) * mine.order // this if mine.multipliers else 0
-            count = max(STEPS[this], int(np.ceil(turns * A_TURN[this])), have)
-        mesh = uniform_mesh(count)
-        if rates.max() > UNEVEN * rates.min() > 0:
-            mesh = np.interp(mesh, angles / angles[-1], at)
-            mesh[0], mesh[-1] = 0.0, 1.0
-        found.append((mesh, this))
+        have = (len(mine.mesh) - 1) * mine.order // this if mine.multipliers else 0
+        least = max(STEPS[this], have)
+        found.append(
+            (mesh_around(problem, mine.place, mine.fractions, mine.duration, this, least, count), this)
+        )
     return found
+
+
+def mesh_around(
+    problem: TransferProblem,
+    places: np.ndarray,
+    fractions: np.ndarray,
+    duration: float,
+    order: int,
+    least: int,
+    count: int | None = None,
+) -> np.ndarray:
+    """Steps of equal times or, where places come near to an attractor, of equal angles around it.
+
+    There are `count` of them or, if that is not given, `least` and as many as the revolutions need.
+    """
+    rates = problem.attraction.rates(places)
+    angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(fractions)))
+    turns = angles[-1] * duration / (2 * np.pi)
+    mesh = uniform_mesh(count or max(least, int(np.ceil(turns * A_TURN[order]))))
+    if rates.max() > UNEVEN * rates.min() > 0:
+        mesh = np.interp(mesh, angles / angles[-1], fractions)
+        mesh[0], mesh[-1] = 0.0, 1.0
+    return mesh

@@ -10,14 +10,14 @@ import numpy as np
 
 from dmoc.basics.numerics import cubic_spline
 from dmoc.legs.legs import Coast, Leg
+from dmoc.missions.guess import mesh_around
 from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.mesh import node_fractions, uniform_mesh
+from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.results.solution import Solution
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import A_TURN, UNEVEN
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
 from dmoc.structure.surfaces import Followed, Tangent
 
@@ -31,6 +31,8 @@ LEAST_STEPS = 2
 SINGULAR_DEGREE = 6
 # A leg of a guess lasts at least this part of the whole duration [-].
 LEAST_GUESSED = 2e-3
+# The angle around attractors is summed up over this many places of a leg.
+SAMPLES = 200
 
 
 def mission_of(problem: TransferProblem, arcs: Sequence[Arc]) -> Mission:
@@ -124,16 +126,10 @@ class Course:
 
     def mesh(self, problem: TransferProblem, span: tuple[float, float], order: int) -> np.ndarray:
         """Steps of equal angles around attractors where the motion is uneven, else of equal times."""
-        fine = np.linspace(*span, 200)
+        fine = np.linspace(*span, SAMPLES)
         places = np.stack([np.interp(fine, self.times, column) for column in self.position.T], axis=1)
-        rates = problem.attraction.rates(places)
-        angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(fine)))
-        count = max(LEAST_STEPS, int(np.ceil(angles[-1] / (2 * np.pi) * A_TURN[order])))
-        mesh = uniform_mesh(count)
-        if rates.max() > UNEVEN * rates.min() > 0:
-            mesh = np.interp(mesh, angles / angles[-1], np.linspace(0.0, 1.0, 200))
-            mesh[0], mesh[-1] = 0.0, 1.0
-        return mesh
+        fractions, duration = np.linspace(0.0, 1.0, SAMPLES), span[1] - span[0]
+        return mesh_around(problem, places, fractions, duration, order, LEAST_STEPS)
 
     def _controls(self, problem: TransferProblem, kind: str, at: np.ndarray) -> np.ndarray:
         if kind == COAST:

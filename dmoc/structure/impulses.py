@@ -39,21 +39,27 @@ def with_best_impulses(found: MissionSolution, solve: Callable[..., MissionSolut
     solve : callable
         (mission, guess) -> MissionSolution.
     """
-    best, ladder, told = found, found.ladder, []
+    ladder, told = list(found.ladder), []
+
+    def again(mission: Mission, path: MissionPath) -> MissionSolution:
+        answer = solve(mission, path)
+        ladder.extend(answer.ladder)
+        return answer
+
+    best = found
     while best.success and len(best.impulses) < MOST_IMPULSES:
         started = _with_another(best)
         if started is None:
             break
         mission, path, index = started
-        tried = _changed(solve(mission, path), best, [MORE, index])
-        tried = _without_idle(tried, solve)
-        ladder += tried.ladder
+        tried = _changed(again(mission, path), best, [MORE, index])
+        tried = _without_idle(tried, again)
         if not tried.success or tried.objective > (1 - WORTH) * best.objective:
             break
         told.append(f"{len(tried.impulses)} impulses cost {tried.objective:.8g}")
         best = tried
-    best = _without_idle(best, solve)
-    return replace(best, ladder=ladder, reason="; ".join([best.reason, *told]))
+    best = _without_idle(best, again)
+    return replace(best, ladder=tuple(ladder), reason="; ".join([best.reason, *told]))
 
 
 def _changed(found: MissionSolution, before: MissionSolution, change: list) -> MissionSolution:
