@@ -96,8 +96,8 @@ def check_numerics(
         raise ValueError(f"options must have names such as 'ipopt.max_iter'; got {short(options)}")
     if steps is not None:
         whole("steps", steps, least=2)
-    if tol is not None and not 1e-11 <= number("tol", tol, "-", positive=True) <= 0.1:
-        raise ValueError(f"tol must lie between 1e-11 and 0.1 [-]; got {tol:g}")
+    if tol is not None and not 1e-11 <= (asked := number("tol", tol, "-", positive=True)) <= 0.1:
+        raise ValueError(f"tol must lie between 1e-11 and 0.1 [-]; got {asked:g}")
     if progress is not None and not callable(progress):
         raise ValueError(f"progress must be a function; got {short(progress)}")
     if time_limit is not None:

@@ -23,7 +23,6 @@ SLOW = pytest.mark.slow
         pytest.param("zones_leapt_moving", {"tol": 1e-5}, 35.874137, marks=SLOW),
         ("zones_leapt_with_drag", {"order": 8}, 26400.799),
         ("eccentric_with_limit", {}, 1.15999e-5),
-        ("eccentric_slow", {"order": 6}, 0.0439508),
     ],
 )
 def test_what_was_red_is_mended(case, numerics, right):
