@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
-from dmoc.missions.path import MissionPath, cold, finer, stretched
+from dmoc.missions.path import MissionPath, cold
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
@@ -90,7 +90,7 @@ class Climb:
         """
         begun, mission = time.perf_counter(), self.mission
         problems = [_rounded(problem, rounding) for problem in mission.stretches]
-        program = MissionProgram.of(mission, problems, path, rounding)
+        program = self.program_of(problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
         if near is not None:
@@ -113,6 +113,10 @@ class Climb:
         self.held = made if made.solved and rounding is None else self.held
         return made
 
+    def program_of(self, problems: list, path: MissionPath, rounding: float | None) -> MissionProgram:
+        """The program of the mission whose legs are these problems."""
+        return MissionProgram.of(self.mission, problems, path, rounding)
+
     def _watch(self, program: MissionProgram) -> Watch:
         def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
             cost = self.mission.objective.sense * objective * program.cost
@@ -129,7 +133,7 @@ class Climb:
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
         for factor in OTHER_DURATIONS:
-            other = self._staged(stretched(self.mission, path, factor), stages)
+            other = self._staged(path.stretched(self.mission, factor), stages)
             if other.solved or other.answer.status == "stopped":
                 return other
         return tried
@@ -141,6 +145,11 @@ class Climb:
         starts = path, cold(failed.path)
         near, self.reason = mission_cause(failed.program, starts, self.levels.append, self.interrupt)
         return failed if near is None else self._staged(near, self._stages())
+
+    @property
+    def impulses(self) -> int:
+        """The number of impulses."""
+        return sum(event.pushes for joint in self.mission.joints for event in joint.events)
 
     def _staged(self, path: MissionPath, stages: list[float | None]) -> Attempt:
         for i, width in enumerate(stages):
@@ -161,7 +170,7 @@ class Climb:
             for one in engines
             if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
         ]
-        if sum(event.pushes for joint in self.mission.joints for event in joint.events) > 2:
+        if self.impulses > 2:
             # One of several impulses may be none at the optimum.
             own.append(LEAST_WIDTH)
         if not own:
@@ -188,7 +197,7 @@ class Climb:
         for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
             if tol is None and _largest(errors) <= accurate:
                 break
-            onto = attempt.path.onto(finer(attempt.path, errors))
+            onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.attempt(onto, carried=True)

@@ -50,11 +50,16 @@ class Placed:
         return self.columns + self.program.columns[group].indices[:, place]
 
 
-def leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
-    """A leg without its sparse derivatives, its blocks, and how many parameters they have."""
+def leg_program(
+    problem: TransferProblem, path: DiscretePath, units: Units, joined: bool = True
+) -> tuple[Program, list, int]:
+    """A leg without its sparse derivatives, its blocks, and how many parameters they have.
+
+    Unless it is `joined` to others before it, its time and mass at the start are known.
+    """
     rule = scheme(path.order)
-    stencils = stencils_of(problem, path.order, path.hold, joined=True)
-    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
+    stencils = stencils_of(problem, path.order, path.hold, joined=joined)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=joined)
     none: Any = None
     program = Program(
         problem,

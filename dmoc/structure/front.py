@@ -141,6 +141,12 @@ def solve(
     rest = options, progress, compiled, time_limit
     if impulses not in (None, "auto"):
         raise ValueError(f"impulses must be 'auto' or not given; got {short(impulses)}")
+    if hasattr(stated, "together"):
+        from dmoc.teams.climb import solve_team
+
+        if structure or impulses is not None:
+            raise ValueError("structure and impulses are of one transfer or mission; a dmoc.Team has neither")
+        return solve_team(stated, order, steps, tol, hold, mesh, guess, *rest)
     if not hasattr(stated, "joints"):
         if impulses is not None:
             raise ValueError("impulses are those of a dmoc.Mission; a transfer has none")

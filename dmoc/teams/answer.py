@@ -1,0 +1,96 @@
+"""The answer of an attempt at a team as a TeamSolution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from dmoc.basics.digits import lasting
+from dmoc.missions.answer import costs_of, worst_rows
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.march import force_of
+from dmoc.motion.momenta import end_momenta
+from dmoc.nlp.ipopt import STATUSES
+from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.team import Team
+from dmoc.solver.rung import cut_short
+from dmoc.teams.solution import TeamSolution
+
+
+def answered(
+    climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
+) -> TeamSolution:
+    """The answer of an attempt as a TeamSolution; that of the last mesh solved if the time was over."""
+    if attempt.answer.status == "stopped" and climb.interrupt.late:
+        attempt = climb.held or attempt
+        found: Any = _answered(climb, attempt, error, True, tol)
+        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
+    return _answered(climb, attempt, error, met, tol)
+
+
+def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> TeamSolution:
+    team, program, answer = climb.mission, attempt.program, attempt.answer
+    path, status, success = attempt.path, answer.status, attempt.solved
+    message = "a local optimum" if success else climb.reason or STATUSES[status].advice
+    if success and not met:
+        status, success = NOT_MET, False
+        reached = "unknown" if error is None else f"{error.largest:.1e}"
+        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    about = Provenance(
+        team.name, team.parameters, team.start_time, team.objective.unit_with(team.actuator), options=climb.options
+    )
+    costs = costs_of(program, answer.x)
+    members = [
+        _member(
+            team.fixed_at(i, team.start_time, float(leg.mass[0]), path.duration),
+            leg,
+            float(cost),
+            attempt.level,
+            answer.status,
+        )
+        for i, (leg, cost) in enumerate(zip(path.legs, costs, strict=True))
+    ]
+    return TeamSolution(
+        team,
+        tuple(members),
+        team.names,
+        path.forces,
+        path.densities,
+        attempt.level.objective,
+        success,
+        status,
+        message,
+        tuple(climb.levels),
+        worst=() if success else worst_rows(program, answer, path),
+        warnings=_warnings(team, path.duration) if success else (),
+        tolerance=tol,
+        error=error,
+        reason=f"{len(members)} bodies on {len(path.mesh) - 1} steps",
+        provenance=about,
+    )
+
+
+def _member(problem: TransferProblem, path: Any, cost: float, level: Level, status: str) -> Solution:
+    dynamics = Dynamics.of(problem)
+    momentum, velocity = end_momenta(dynamics, path, problem.start_time)
+    return Solution(
+        problem=problem,
+        path=path,
+        **reported(path, velocity, momentum, force_of(dynamics, path)),
+        objective=problem.objective.sense * cost,
+        success=status == "solved",
+        status=status,
+        message="a body of a team",
+        ladder=(level,),
+        provenance=Provenance.of(problem),
+    )
+
+
+def _warnings(team: Team, duration: float) -> tuple[str, ...]:
+    bound = team.members[0].limit_of_duration(duration)
+    if bound is None:
+        return ()
+    other = "shorter" if bound == "shortest" else "longer"
+    return (f"the duration ends on its {bound} limit of {lasting(duration, 6)}: a {other} one may cost less",)

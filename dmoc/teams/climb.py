@@ -1,0 +1,114 @@
+"""Solve a team, coarse to fine, on one mesh for all its bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.path import MissionPath, cold
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.nlp.transcription import check_mesh
+from dmoc.scene.team import Team
+from dmoc.solver.solve import check_numerics
+from dmoc.teams.answer import answered
+from dmoc.teams.cuts import leapt
+from dmoc.teams.guess import guessed
+from dmoc.teams.path import TeamPath
+from dmoc.teams.program import TeamProgram
+from dmoc.teams.solution import TeamSolution
+
+# A team has this order if none is asked for: where bodies touch their distance the forces have kinks, from
+# which orders above it gain little.
+ORDER = 4
+# It has this many steps at each order, if no number is asked for.
+STEPS = {2: 120, 4: 30, 6: 20, 8: 15}
+# Steps in which two bodies come too near between nodes are cut in two at most so many times.
+MOST_CUT = 4
+
+
+class TeamClimb(Climb):
+    """The attempts at one team, in their order."""
+
+    def program_of(self, problems: list, path: MissionPath, rounding: float | None) -> TeamProgram:
+        return TeamProgram.of(self.mission, problems, path, rounding)
+
+    @property
+    def impulses(self) -> int:
+        return 0
+
+    def unleapt(self, attempt: Attempt) -> Attempt:
+        """The answer on a mesh on which no two bodies come too near between nodes, if that is found."""
+        for _ in range(MOST_CUT):
+            path: Any = attempt.path
+            if not len(steps := leapt(self.mission, path)):
+                break
+            middles = 0.5 * (path.mesh[1:] + path.mesh[:-1])[steps]
+            onto = path.onto([(np.sort(np.append(path.mesh, middles)), path.order)])
+            found = self.attempt(onto, carried=True)
+            if not found.solved and found.answer.status != "stopped":
+                found = self.attempt(cold(onto), carried=True)
+            if not found.solved:
+                return found if found.answer.status == "stopped" else attempt
+            attempt = found
+        return attempt
+
+
+def solve_team(
+    team: Team,
+    order: int | None = None,
+    steps: int | None = None,
+    tol: float | None = None,
+    hold: bool = False,
+    mesh: Any = None,
+    guess: Any = None,
+    options: dict[str, Any] | None = None,
+    progress: Any = None,
+    compiled: bool = False,
+    time_limit: float | None = None,
+) -> TeamSolution:
+    """Solve a team; the arguments are those of `dmoc.solve`, and the mesh is one for all bodies."""
+    check_numerics(order, steps, tol, hold, options, progress, time_limit)
+    climb = TeamClimb(team, options, progress, compiled, time_limit)
+    path = first_path(team, order, steps, hold, guess, mesh)
+    with climb.interrupt:
+        first = climb.attempt(path) if path.warm else climb.from_guess(path)
+        if not first.solved:
+            first = climb.explained(path, first)
+        if not first.solved:
+            return answered(climb, first)
+        given = steps is not None or mesh is not None
+        if given and tol is None:
+            return answered(climb, first)
+        found, error, met = climb.refined(first, tol)
+        return answered(climb, climb.unleapt(found) if met else found, error, met, tol)
+
+
+def first_path(
+    team: Team, order: int | None, steps: int | None, hold: bool, guess: Any = None, mesh: Any = None
+) -> TeamPath:
+    """The path to start from, on its first mesh."""
+    given = team.guess if guess is None else guess
+    given = getattr(given, "path", given)
+    this = order or ORDER
+    if isinstance(given, TeamPath):
+        _check_fits(team, given)
+        if order is None and steps is None and mesh is None:
+            return given
+        same = given.mesh if steps is None else uniform_mesh(steps)
+        return given.onto([(same if mesh is None else check_mesh(None, mesh), order or given.order)])
+    ends = uniform_mesh(steps or STEPS[this]) if mesh is None else check_mesh(None, mesh)
+    return guessed(team, (ends, this, hold), given)
+
+
+def _check_fits(team: Team, path: TeamPath) -> None:
+    for name, problem, leg in zip(team.names, team.members, path.legs, strict=False):
+        sizes = (leg.position.shape[1], leg.control.shape[1]), (problem.size, problem.controls)
+        if sizes[0] != sizes[1]:
+            raise ValueError(
+                f"guess: {name} has {sizes[0][0]} coordinates and {sizes[0][1]} controls there, "
+                f"and {sizes[1][0]} and {sizes[1][1]} in the team"
+            )
+    if len(team.members) != len(path.legs):
+        raise ValueError(f"guess is of {len(path.legs)} bodies, and the team has {len(team.members)}")

@@ -1,0 +1,155 @@
+"""The paths of all bodies to start from, bent so that no two of them run into each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import entries, short
+from dmoc.ends.base import State
+from dmoc.guess.open_ends import end_estimates
+from dmoc.guess.starting import guess_duration, starting_guess
+from dmoc.motion.path import DiscretePath
+from dmoc.parts.detours import CENTRAL, CLEARANCE
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.team import Team
+from dmoc.teams.path import TeamPath
+
+# Paths are bent apart at most so many times: bends past one body may lead into another one.
+PASSES = 3
+
+
+def guessed(
+    team: Team,
+    numerics: tuple[np.ndarray, int, bool],
+    given: Any = None,
+    sides: Sequence[int] = (),
+    duration: float | None = None,
+) -> TeamPath:
+    """A guess on a mesh, order and kind of control: each body's own, bent apart from those of the others.
+
+    Two bodies that change places head-on have a path through each other as their guess. There both ways round
+    are equally near, the gradient of their distance across the path is zero, and every step of the optimiser
+    keeps to the line; nothing but a bend to one side can tell it which way round to go. So they are bent
+    sideways, each to its own left (in space, around the axis that they move along least): a team that meets in
+    one place then turns around it as on a roundabout. `sides` has -1 for pairs that pass on the other side.
+    """
+    parts = _each(team, given)
+    duration = duration or max(map(guess_duration, team.members))
+    aims = meeting_places(team, duration)
+    legs = []
+    for i, (problem, mine) in enumerate(zip(team.members, parts, strict=True)):
+        aimed = problem if aims[i] is None or problem.turns else replace(problem, goal=State(aims[i], None))
+        path = starting_guess(aimed, *numerics, mine, duration)
+        legs.append(path if path.multipliers else replace(path, multipliers={}))
+    start = TeamPath(tuple(legs), (team.start_time,) * len(legs))
+    return bent_apart(team, start, sides)
+
+
+def _each(team: Team, given: Any) -> tuple:
+    """A guess for each body, or None."""
+    if given is None:
+        return (None,) * len(team.members)
+    found = entries(given)
+    if found is None or len(found) != len(team.members):
+        raise ValueError(
+            f"guess of a team must be a former solution or {len(team.members)} guesses, one a body; "
+            f"got {short(given)}"
+        )
+    return found
+
+
+def meeting_places(team: Team, duration: float) -> list[Any]:
+    """Where each body may meet others: a place that is given, else the middle of where they would be; or None."""
+    found: list[Any] = [None] * len(team.members)
+    for part in team.together:
+        bodies = sorted({i for pair in part.pairs(team.names) for i in pair}) if part.meets else []
+        ends = [_end(team.members[i], duration) for i in bodies]
+        given = [place for place, known in ends if known]
+        for i, (_, known) in zip(bodies, ends, strict=True):
+            if not known:
+                found[i] = tuple(given[0] if given else np.mean([place for place, _ in ends], axis=0))
+    return found
+
+
+def _end(problem: TransferProblem, duration: float) -> tuple[np.ndarray, bool]:
+    """Where a body would end [m], and whether its own goal says so."""
+    (begin, _), (place, _) = end_estimates(problem, duration)
+    known = not np.isnan(problem.goal.point.estimate(problem.start_time + duration)[0]).any()
+    begin = np.where(np.isnan(begin), 0.0, begin)
+    return np.where(np.isnan(place), begin, place), known
+
+
+def bent_apart(team: Team, path: TeamPath, sides: Sequence[int] = ()) -> TeamPath:
+    """A path on which bodies that come nearer to each other than they may are bent to their sides."""
+    if team.dimension == 1:
+        return path
+    for _ in range(PASSES):
+        bends = [np.zeros_like(leg.place) for leg in path.legs]
+        near = list(too_near(team, path))
+        for place, a, b, distance in near:
+            side = sides[place] if place < len(sides) else 0
+            bend = _bend(path.legs[a], path.legs[b], distance, side)
+            bends[a] -= 0.5 * bend
+            bends[b] += 0.5 * bend
+        path = replace(path, legs=tuple(leg.moved(bend) for leg, bend in zip(path.legs, bends, strict=True)))
+        if not near:
+            break
+    return path
+
+
+def too_near(team: Team, path: TeamPath) -> Iterator[tuple[int, int, int, float]]:
+    """Pairs that come nearer than they may: which of all pairs, the two bodies, their least distance allowed."""
+    for i, (part, a, b) in enumerate(team.pairs()):
+        if not (distance := part.distance_kept):
+            continue
+        gap = np.linalg.norm(path.legs[b].place - path.legs[a].place, axis=1)[1:-1]
+        if gap.min() < distance:
+            yield i, a, b, distance
+
+
+def other_sides(team: Team, path: TeamPath) -> Iterator[tuple[int, ...]]:
+    """Which pairs pass on which side, all ways in turn: those that come near; the usual way is the first."""
+    near = [i for i, *_ in too_near(team, path)]
+    for signs in product((1, -1), repeat=len(near)):
+        sides = [0] * len(team.pairs())
+        for place, sign in zip(near, signs, strict=True):
+            sides[place] = sign
+        yield tuple(sides)
+
+
+def _bend(first: DiscretePath, second: DiscretePath, distance: float, side: int) -> np.ndarray:
+    """How the way of one body as the other one sees it is bent past it, zero at both ends [m].
+
+    It passes on the side (1 left, -1 right) or, if that is 0, on the nearer one: on the left if none is.
+    """
+    apart, fractions = second.place - first.place, first.fractions
+    node = int(np.argmin(np.linalg.norm(apart[1:-1], axis=1))) + 1
+    along = apart[node + 1] - apart[node - 1]
+    if not np.linalg.norm(along):
+        return np.zeros_like(apart)
+    along = along / np.linalg.norm(along)
+    left = _left_of(along)
+    aside = float(apart[node] @ left)
+    if side == 0:
+        side = 1 if abs(aside) <= CENTRAL * distance else int(np.sign(aside))
+    peak = fractions[node]
+    shape = np.where(fractions < peak, fractions / peak, (1 - fractions) / (1 - peak))
+    reach = side * CLEARANCE * distance - aside
+    # On the side where it is it may be far enough already.
+    reach = reach if side * reach > 0 else 0.0
+    return np.sin(0.5 * np.pi * shape)[:, None] * reach * left
+
+
+def _left_of(along: np.ndarray) -> np.ndarray:
+    """A direction across another one: to its left, seen from the axis that it follows least."""
+    if len(along) == 2:
+        return np.array([-along[1], along[0]])
+    # z before y before x, where they are equal: a team that moves in a plane x-y passes as in the plane.
+    axis = np.eye(3)[2 - int(np.argmin(np.abs(along[::-1])))]
+    left = np.cross(axis, along)
+    return left / np.linalg.norm(left)

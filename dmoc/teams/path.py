@@ -1,0 +1,102 @@
+"""The path of a team: those of its bodies on one mesh, and what holds between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.missions.path import MissionPath, cut_in_two
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_fractions, node_weights
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.mission import Mission
+from dmoc.scene.team import Team
+
+
+@dataclass(frozen=True)
+class TeamPath(MissionPath):
+    """The paths of all bodies, which stand on one mesh and last equally long.
+
+    Attributes
+    ----------
+    legs : tuple of DiscretePath
+        One a body.
+    begins : tuple of float
+        Time at the start [s], once a body.
+    forces : dict of array
+        Multipliers of rows at the end [objective per unit of the row], by the names of their groups.
+    densities : dict of array, shape (nodes, rows)
+        Multipliers of rows at the nodes per fraction of the duration, by the names of their groups.
+    """
+
+    densities: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.legs[0].duration
+
+    @property
+    def mesh(self) -> np.ndarray:
+        """Step ends as fractions of the duration."""
+        return self.legs[0].mesh
+
+    @property
+    def order(self) -> int:
+        return self.legs[0].order
+
+    def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> TeamPath:
+        """The same on another mesh and order; there is one for all bodies."""
+        (mesh, order), *_ = meshes
+        old, new = self.legs[0].fractions, node_fractions(mesh, scheme(order))
+        moved = {
+            name: np.stack([np.interp(new, old, column) for column in values.T], axis=1)
+            for name, values in self.densities.items()
+        }
+        return replace(self, legs=tuple(leg.onto(mesh, order, leg.hold) for leg in self.legs), densities=moved)
+
+    def finer(self, errors: Sequence[np.ndarray]) -> TeamPath:
+        """The same on a mesh where the steps that make up the errors of all bodies are cut in two."""
+        (finer,) = cut_in_two(self.legs[:1], [np.sum(errors, axis=0)])
+        return self.onto([finer])
+
+    def stretched(self, mission: Any, factor: float) -> TeamPath:
+        """The same but so many times as long, within the bounds of a free duration."""
+        duration = float(np.clip(factor * self.duration, *mission.duration_bounds))
+        return replace(self, legs=tuple(replace(leg, duration=duration) for leg in self.legs))
+
+    def without_idle(self, mission: Mission, nothing: float) -> TeamPath:
+        """Itself: a team has no impulses."""
+        return self
+
+    @property
+    def weights(self) -> np.ndarray:
+        """The share of the duration that belongs to each node [-]."""
+        return node_weights(self.mesh, scheme(self.order))
+
+
+def between(path: TeamPath, team: Team, pair: tuple[int, int]) -> DiscretePath:
+    """The path of one body as another one sees it: the differences of their places [m]."""
+    first, second = (path.legs[i] for i in pair)
+    drifts = [
+        leg[1] - leg[0]
+        for leg in (
+            (getattr(first, side)[first.coordinates.speeds], getattr(second, side)[second.coordinates.speeds])
+            for side in ("start_velocity", "goal_velocity")
+        )
+    ]
+    none = np.zeros((len(first.control), 0))
+    return DiscretePath(
+        first.mesh,
+        first.order,
+        first.hold,
+        first.duration,
+        second.place - first.place,
+        none,
+        np.ones(len(first.position)),
+        *drifts,
+    )
+
