@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # A file of a mission says that it has this format.
 MISSION = "dmoc mission"
+# A file of a team says that it has this one.
+TEAM = "dmoc team"
 
 
 @overload
@@ -185,6 +187,10 @@ def verify(
     problem: TransferProblem | Mission | None = None,
     more: Sequence[Callable] = (),
 ) -> Report:
+    if hasattr(solution, "members"):
+        from dmoc.teams.checks import verify_team
+
+        return verify_team(solution, problem, more)
     if not hasattr(solution, "impulses"):
         return verification.verify(solution, problem, more)  # type: ignore[arg-type]
     from dmoc.missions.checks import verify_mission
@@ -196,7 +202,12 @@ verify.__doc__ = verification.verify.__doc__
 
 
 def load(path: str | os.PathLike) -> Any:
-    if not as_path(path).is_file() or format_of(path) != MISSION:
+    kind = format_of(path) if as_path(path).is_file() else None
+    if kind == TEAM:
+        from dmoc.teams.solution import read_team
+
+        return read_team(path)
+    if kind != MISSION:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission
     from dmoc.structure.solution import as_found

@@ -13,7 +13,6 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
-from dmoc.scene.team import Team
 
 
 @dataclass(frozen=True)
@@ -78,25 +77,21 @@ class TeamPath(MissionPath):
         return node_weights(self.mesh, scheme(self.order))
 
 
-def between(path: TeamPath, team: Team, pair: tuple[int, int]) -> DiscretePath:
-    """The path of one body as another one sees it: the differences of their places [m]."""
+def between(path: TeamPath, pair: tuple[int, int]) -> DiscretePath:
+    """The path of the second of two bodies as the first one sees it: the differences of their places [m]."""
     first, second = (path.legs[i] for i in pair)
-    drifts = [
-        leg[1] - leg[0]
-        for leg in (
-            (getattr(first, side)[first.coordinates.speeds], getattr(second, side)[second.coordinates.speeds])
-            for side in ("start_velocity", "goal_velocity")
-        )
-    ]
-    none = np.zeros((len(first.control), 0))
-    return DiscretePath(
-        first.mesh,
-        first.order,
-        first.hold,
-        first.duration,
-        second.place - first.place,
-        none,
-        np.ones(len(first.position)),
-        *drifts,
+    speeds = [(leg.start_velocity, leg.goal_velocity) for leg in (first, second)]
+    (before, there), (behind, arriving) = (
+        [velocity[leg.coordinates.speeds] for velocity in each]
+        for leg, each in zip((first, second), speeds, strict=True)
     )
-
+    return replace(
+        first,
+        position=second.place - first.place,
+        control=np.zeros((len(first.control), 0)),
+        start_velocity=behind - before,
+        goal_velocity=arriving - there,
+        multipliers={},
+        made_of=None,
+        reaction=None,
+    )

@@ -1,0 +1,72 @@
+"""The checks of a team: of every body, of what holds between them, and of the whole."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.checks.evidence import Evidence
+from dmoc.checks.limits import Excess
+from dmoc.checks.verification import CHECKS, Check, Report
+from dmoc.missions.checks import LEAST, Whole, fastest, worst_of
+from dmoc.results.between import BOUND
+from dmoc.teams.cuts import team_cuts
+from dmoc.teams.program import TeamProgram
+from dmoc.teams.solution import TeamSolution
+
+
+def verify_team(solution: TeamSolution, problem: Any = None, more: Sequence = ()) -> Report:
+    """Check a team, without a look at the optimiser's own verdict on it.
+
+    Every body is checked as a transfer between its two ends, and the worst one is told; `together` is what two
+    bodies keep, at the nodes, between them and at the end, and that all last equally long; `optimality` are the
+    first-order conditions of the whole team.
+    """
+    if more:
+        raise ValueError("a team takes no checks of your own yet; verify(solution.members[k], more=...) does")
+    solution = solution if problem is None else solution.attach(problem)
+    begun, team = time.perf_counter(), solution.require_problem()
+    with np.errstate(all="ignore"):
+        least = LEAST * solution.path.diagonal, LEAST * max(fastest(one) for one in solution.members)
+        bodies = [Evidence(replace(one, tolerance=solution.tolerance), least) for one in solution.members]
+        undefined = next((found for one in bodies if (found := one.undefined())), "")
+        if undefined:
+            return Report((Check("bodies", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
+        turning = any(one.path.attitudes for one in bodies)
+        checks = [
+            worst_of(solution.names, bodies, check)
+            for name, check in CHECKS.items()
+            if name != "optimality" and (turning or name != "constraint")
+        ]
+        checks.append(_together(solution, bodies))
+        path = solution.path
+        whole = Whole(solution, TeamProgram.of(team, team.stretches, path), path)
+        checks.append(whole.optimality())
+    return Report(tuple(checks), time.perf_counter() - begun)
+
+
+def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
+    """What holds between two bodies: the excess that is the largest part of what is allowed."""
+    team, path = solution.require_problem(), solution.path
+    found = [Excess(cut.name, cut.value, cut.allowed, cut.unit) for cut in team_cuts(team, path)]
+    for name, (part, a, b) in zip(team.pair_names(), team.pairs(), strict=True):
+        pair = bodies[a], bodies[b]
+        sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
+        ends = [one.path.place[-1] for one in pair]
+        speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in pair]
+        for row in part.goal_rows(ends[1] - ends[0], speeds[1] - speeds[0]):
+            value = float(row.expression)
+            beyond = max(row.lower - value, value - row.upper, 0.0) if np.isfinite(value) else np.nan
+            found.append(Excess(f"{name} {row.name}", beyond, BOUND * sizes[row.unit], row.unit))
+    durations = np.array([one.duration for one in path.legs])
+    found.append(Excess("common duration", float(np.ptp(durations)), BOUND * path.duration, "s"))
+    shortest, longest = team.duration_bounds
+    off = max(shortest - durations.min(), durations.max() - longest, 0.0)
+    found.append(Excess("duration", float(off), BOUND * longest, "s"))
+    worst = max(found, key=lambda one: one.share)
+    note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
+    return Check.of("together", worst.value, worst.allowed, worst.unit, note)
