@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.path import MissionPath, cold
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
+from dmoc.results.facts import Error
 from dmoc.scene.team import Team
 from dmoc.solver.solve import check_numerics
 from dmoc.teams.answer import answered
@@ -26,6 +28,8 @@ ORDER = 4
 STEPS = {2: 120, 4: 30, 6: 20, 8: 15}
 # Steps in which two bodies come too near between nodes are cut in two at most so many times.
 MOST_CUT = 4
+# Steps in which two bodies touch are cut in two so many times.
+SHARPENED = 3
 
 
 class TeamClimb(Climb):
@@ -38,17 +42,39 @@ class TeamClimb(Climb):
     def impulses(self) -> int:
         return 0
 
+    def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
+        """As of a mission; where two bodies touch, the objective nears its limit by leaps.
+
+        It errs by about the square of the time from the touch to a node, which is anything up to a step: a small
+        change says little if the one before, over four as the square of half the step, was larger.
+        """
+        error, path = super()._error(attempt, changes, summed), attempt.path
+        if not len(path.touched()):
+            return error
+        return replace(error, objective=max(changes[-1], *[0.25 * change for change in changes[-2:-1]], 0.0))
+
     def unleapt(self, attempt: Attempt) -> Attempt:
         """The answer on a mesh on which no two bodies come too near between nodes, if that is found."""
         for _ in range(MOST_CUT):
             path: Any = attempt.path
             if not len(steps := leapt(self.mission, path)):
                 break
-            middles = 0.5 * (path.mesh[1:] + path.mesh[:-1])[steps]
-            onto = path.onto([(np.sort(np.append(path.mesh, middles)), path.order)])
+            onto = path.cut(path.mesh, steps)
             found = self.attempt(onto, carried=True)
             if not found.solved and found.answer.status != "stopped":
                 found = self.attempt(cold(onto), carried=True)
+            if not found.solved:
+                return found if found.answer.status == "stopped" else attempt
+            attempt = found
+        return attempt
+
+    def sharpened(self, attempt: Attempt) -> Attempt:
+        """The answer on a mesh that is finer where two bodies touch, if that is found."""
+        for _ in range(SHARPENED):
+            path: Any = attempt.path
+            if not attempt.solved or not len(steps := path.touched()):
+                break
+            found = self.attempt(path.cut(path.mesh, steps), carried=True)
             if not found.solved:
                 return found if found.answer.status == "stopped" else attempt
             attempt = found
@@ -82,7 +108,8 @@ def solve_team(
         if given and tol is None:
             return answered(climb, first)
         found, error, met = climb.refined(first, tol)
-        return answered(climb, climb.unleapt(found) if met else found, error, met, tol)
+        found = climb.unleapt(found) if met else found
+        return answered(climb, climb.sharpened(found) if tol is None else found, error, met, tol)
 
 
 def first_path(

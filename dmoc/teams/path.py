@@ -14,6 +14,11 @@ from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 
+# Two bodies touch at a node whose multiplier is more than this part of the largest one [-].
+PUSHES = 1e-3
+# Steps that add up to less than this error, as a part of the path, need not be cut where two bodies touch [-].
+NOTHING = 1e-9
+
 
 @dataclass(frozen=True)
 class TeamPath(MissionPath):
@@ -58,9 +63,30 @@ class TeamPath(MissionPath):
         return replace(self, legs=tuple(leg.onto(mesh, order, leg.hold) for leg in self.legs), densities=moved)
 
     def finer(self, errors: Sequence[np.ndarray]) -> TeamPath:
-        """The same on a mesh where the steps that make up the errors of all bodies are cut in two."""
-        (finer,) = cut_in_two(self.legs[:1], [np.sum(errors, axis=0)])
-        return self.onto([finer])
+        """The same on a mesh where the steps that err are cut in two, and those in which two bodies touch."""
+        summed = np.sum(errors, axis=0)
+        touched = self.touched()
+        if not len(touched) or summed.sum() > NOTHING:
+            (finer,) = cut_in_two(self.legs[:1], [summed])
+            return self.onto([finer]).cut(self.mesh, touched)
+        return self.cut(self.mesh, touched)
+
+    def cut(self, mesh: np.ndarray, steps: np.ndarray) -> TeamPath:
+        """The same with some steps of a mesh cut in two, where they are not yet."""
+        middles = 0.5 * (mesh[1:] + mesh[:-1])[steps]
+        return self.onto([(np.unique(np.concatenate([self.mesh, middles])), self.order)])
+
+    def touched(self) -> np.ndarray:
+        """The steps at whose nodes two bodies are as near as they may be: where rows push them apart.
+
+        The time at which they touch is none of the nodes', which costs about the square of the steps there.
+        """
+        pushes = [np.abs(values).max(axis=1) * self.weights for values in self.densities.values()]
+        if not pushes or not (largest := max(push.max() for push in pushes)):
+            return np.zeros(0, int)
+        nodes = np.flatnonzero(np.max(pushes, axis=0) > PUSHES * largest)
+        degree, last = scheme(self.order).degree, len(self.mesh) - 2
+        return np.unique(np.clip([nodes // degree, (nodes - 1) // degree], 0, last))
 
     def stretched(self, mission: Any, factor: float) -> TeamPath:
         """The same but so many times as long, within the bounds of a free duration."""
