@@ -38,6 +38,8 @@ def animate(solution: Solution, path: str | os.PathLike, frames: int = 80) -> No
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
+    if hasattr(solution, "members"):
+        raise ValueError("a team of bodies has no moving picture yet; animate(solution.members[0], path) has")
     of_kind("solution", solution, Solution)
     check_target(path)
     if type(frames) is not int or not 2 <= frames <= MOST_FRAMES:

@@ -71,7 +71,7 @@ def save_figure(
     ValueError
         If the suffix is another one or the folder does not exist.
     """
-    if not hasattr(solution, "impulses"):
+    if not (hasattr(solution, "impulses") or hasattr(solution, "members")):
         of_kind("solution", solution, Solution)
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
@@ -99,6 +99,10 @@ def figure(solution: Any, report: Report | None = None) -> Figure:
             from dmoc.plots.mission import mission_page
 
             return mission_page(solution, report)
+        if hasattr(solution, "members"):
+            from dmoc.plots.team import team_page
+
+            return team_page(solution, report)
         page = new_page(solution.dimension)
         turns = bool(solution.path.attitudes)
         held = solution.reaction is not None

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 @wraps(march.simulate)
 def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Trajectory:
     problem = getattr(problem, "alone", None) or problem
+    if hasattr(problem, "together"):
+        raise ValueError(
+            "a team of bodies cannot be simulated as a whole; simulate its members, each with its own solution: "
+            "dmoc.simulate(team.members[0], solution.members[0])"
+        )
     if not hasattr(problem, "joints"):
         return march.simulate(problem, controls, *given, **more)
     return flown_mission(problem, controls)

@@ -28,7 +28,7 @@ def guessed(
     numerics: tuple[np.ndarray, int, bool],
     given: Any = None,
     sides: Sequence[int] = (),
-    duration: float | None = None,
+    bent: bool = True,
 ) -> TeamPath:
     """A guess on a mesh, order and kind of control: each body's own, bent apart from those of the others.
 
@@ -39,15 +39,14 @@ def guessed(
     one place then turns around it as on a roundabout. `sides` has -1 for pairs that pass on the other side.
     """
     parts = _each(team, given)
-    duration = duration or max(map(guess_duration, team.members))
+    duration = max(map(guess_duration, team.members))
     aims = meeting_places(team, duration)
     legs = []
     for i, (problem, mine) in enumerate(zip(team.members, parts, strict=True)):
         aimed = problem if aims[i] is None or problem.turns else replace(problem, goal=State(aims[i], None))
-        path = starting_guess(aimed, *numerics, mine, duration)
-        legs.append(path if path.multipliers else replace(path, multipliers={}))
+        legs.append(starting_guess(aimed, *numerics, mine, duration))
     start = TeamPath(tuple(legs), (team.start_time,) * len(legs))
-    return bent_apart(team, start, sides)
+    return bent_apart(team, start, sides) if bent else start
 
 
 def _each(team: Team, given: Any) -> tuple:
