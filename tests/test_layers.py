@@ -27,6 +27,7 @@ LAYERS = [
     ["diagnosis"],
     ["solver", "checks"],
     ["missions"],
+    ["teams"],
     ["structure"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],

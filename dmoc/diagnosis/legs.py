@@ -66,10 +66,9 @@ class Elastic:
 
     def level(self, answer: Answer, build_s: float) -> Level:
         """One run as a level of the ladder."""
-        schemes = [leg.program.scheme.order for leg in self.program.legs]
-        steps = sum(len(leg.program.mesh) - 1 for leg in self.program.legs)
+        order, steps = self.program.numerics
         told = answer.iterations, answer.objective, build_s, answer.seconds, answer.status
-        return Level(max(schemes), steps, *told, evaluations=answer.evaluations)
+        return Level(order, steps, *told, evaluations=answer.evaluations)
 
     def relaxed(self, *limits: Yielding) -> Relaxation:
         """The elastic program in which these limits give way by one slack."""

@@ -65,7 +65,7 @@ class Attempt:
 class Climb:
     """The attempts at one mission, in their order."""
 
-    def __init__(self, mission: Mission, options: Any, progress: Any, compiled: bool, time_limit: float | None):
+    def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
         self.compiled = compiled
         self.interrupt = Interrupt(time_limit)

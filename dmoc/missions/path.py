@@ -212,4 +212,3 @@ def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
 def cold(path: MissionPath) -> MissionPath:
     """A path without multipliers."""
     return replace(path, legs=tuple(replace(leg, multipliers={}) for leg in path.legs), forces={})
-

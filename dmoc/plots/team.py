@@ -27,7 +27,7 @@ BODY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9")
 MOMENTS = 5
 # A legend has room for so many pairs; more are drawn in grey, and the nearest of all in a colour.
 MOST_PAIRS = 6
-# Distances are drawn up to so many times the largest that is to be kept, unless they are all above it [-].
+# Distances that grow much larger are drawn up to so many times the largest that is to be kept [-].
 FAR = 4.0
 
 
@@ -201,16 +201,16 @@ def _draw_distances(axes: Any, solution: TeamSolution, late: float) -> None:
     colours = styles(names)
     for (i, k), (times, distance) in zip(every, curves, strict=True):
         label = f"{names[i]}, {names[k]}" if len(every) <= MOST_PAIRS else "_pair"
-        # Dashes of one body's colour on a line of the other's.
-        axes.plot(times / late, distance / size, color=colours[i]["color"], label=label)
-        axes.plot(times / late, distance / size, color=colours[k]["color"], linestyle=(0, (4, 4)), label="_other")
+        # A line of the colours of both bodies.
+        style = {"color": colours[i]["color"], "gapcolor": colours[k]["color"], "linestyle": (0, (4, 4))}
+        axes.plot(times / late, distance / size, label=label, **style)
     for least in sorted(set(kept.values())):
         axes.axhline(least / size, label="to be kept", **LIMIT)
+    most = 1.05 * max(float(distance.max()) for _, distance in curves)
     if kept:
         nearest = min(float(distance.min()) for _, distance in curves)
         top = max(FAR * max(kept.values()), 1.2 * nearest)
-        axes.set_ylim(0.0, min(top, 1.05 * max(float(distance.max()) for _, distance in curves)) / size)
-    else:
-        axes.set_ylim(bottom=0)
+        most = top if most > FAR / 2 * top else most
+    axes.set_ylim(0.0, (most or 1.0) / size)
     axes.set_ylabel(f"distance [{unit}]")
     axes.set_title("Distance of each two bodies")

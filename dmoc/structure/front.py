@@ -190,7 +190,7 @@ def verify(
     if hasattr(solution, "members"):
         from dmoc.teams.checks import verify_team
 
-        return verify_team(solution, problem, more)
+        return verify_team(solution, problem, more)  # type: ignore[arg-type]
     if not hasattr(solution, "impulses"):
         return verification.verify(solution, problem, more)  # type: ignore[arg-type]
     from dmoc.missions.checks import verify_mission

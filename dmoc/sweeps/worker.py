@@ -192,7 +192,7 @@ def _efforts(solution: Any) -> dict[str, float]:
     from dmoc.motion.mesh import node_weights
 
     effort = impulse = 0.0
-    parts = getattr(solution, "members", None) or getattr(solution, "legs", (solution,))
+    parts: Any = getattr(solution, "members", None) or getattr(solution, "legs", (solution,))
     for leg in parts:
         path = leg.path
         weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))

@@ -39,7 +39,11 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         reached = "unknown" if error is None else f"{error.largest:.1e}"
         message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
     about = Provenance(
-        team.name, team.parameters, team.start_time, team.objective.unit_with(team.actuator), options=climb.options
+        team.name,
+        team.parameters,
+        team.start_time,
+        team.objective.unit_with(team.actuator),
+        options=climb.options,
     )
     costs = costs_of(program, answer.x)
     members = [

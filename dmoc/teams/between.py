@@ -57,9 +57,7 @@ class BetweenBodies:
     def _durations(self) -> None:
         """The duration of every other body is that of the first one."""
         lasts = ca.SX.sym("T", len(self.legs))
-        rows = [
-            Row(name, lasts[i + 1] - lasts[0], 0.0, 0.0, "s") for i, name in enumerate(self.team.names[1:])
-        ]
+        rows = [Row(name, lasts[i + 1] - lasts[0], 0.0, 0.0, "s") for i, name in enumerate(self.team.names[1:])]
         at = np.array([int(leg.at("duration", 0)[0]) for leg in self.legs])
         made = self._kernel(DURATION, lasts, ca.SX(0, 1), rows)
         self._add(DURATION, "end", rows, at[:, None], made, np.empty(0))
@@ -108,4 +106,3 @@ class BetweenBodies:
         leg = self.legs[body]
         made = leg.program.dynamics.configuration.coordinates
         return leg.at("goal.velocity", 0)[made.speeds]
-

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.path import MissionPath, cold
 from dmoc.motion.mesh import uniform_mesh
@@ -45,10 +43,11 @@ class TeamClimb(Climb):
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """As of a mission; where two bodies touch, the objective nears its limit by leaps.
 
-        It errs by about the square of the time from the touch to a node, which is anything up to a step: a small
-        change says little if the one before, over four as the square of half the step, was larger.
+        It errs by about the square of the time from the touch to a node, which is anything up to a step. So a
+        small change says little if the one before, over four as the square of half the step, was larger.
         """
-        error, path = super()._error(attempt, changes, summed), attempt.path
+        error = super()._error(attempt, changes, summed)
+        path: Any = attempt.path
         if not len(path.touched()):
             return error
         return replace(error, objective=max(changes[-1], *[0.25 * change for change in changes[-2:-1]], 0.0))

@@ -63,7 +63,7 @@ def _each(team: Team, given: Any) -> tuple:
 
 
 def meeting_places(team: Team, duration: float) -> list[Any]:
-    """Where each body may meet others: a place that is given, else the middle of where they would be; or None."""
+    """Where each body may meet others, or None: a place that is given, else the middle of where they end."""
     found: list[Any] = [None] * len(team.members)
     for part in team.together:
         bodies = sorted({i for pair in part.pairs(team.names) for i in pair}) if part.meets else []
@@ -102,7 +102,7 @@ def bent_apart(team: Team, path: TeamPath, sides: Sequence[int] = ()) -> TeamPat
 
 
 def too_near(team: Team, path: TeamPath) -> Iterator[tuple[int, int, int, float]]:
-    """Pairs that come nearer than they may: which of all pairs, the two bodies, their least distance allowed."""
+    """Pairs that come nearer than they may: which of all pairs, the two bodies, and what they are to keep."""
     for i, (part, a, b) in enumerate(team.pairs()):
         if not (distance := part.distance_kept):
             continue

@@ -44,6 +44,11 @@ class TeamPath(MissionPath):
         return self.legs[0].duration
 
     @property
+    def mass(self) -> np.ndarray:
+        """Mass of all bodies at the nodes [kg]."""
+        return np.sum([leg.mass for leg in self.legs], axis=0)
+
+    @property
     def mesh(self) -> np.ndarray:
         """Step ends as fractions of the duration."""
         return self.legs[0].mesh

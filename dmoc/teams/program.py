@@ -86,7 +86,11 @@ class TeamProgram(MissionProgram):
             columns = slice(placed.columns, placed.columns + program.columns.size)
             rows = slice(placed.rows, placed.rows + program.rows.size)
             mine = replace(
-                answer, x=answer.x[columns], lam_x=answer.lam_x[columns], lam_g=answer.lam_g[rows], g=answer.g[rows]
+                answer,
+                x=answer.x[columns],
+                lam_x=answer.lam_x[columns],
+                lam_g=answer.lam_g[rows],
+                g=answer.g[rows],
             )
             legs.append(program.path(program.problem, mine))
         found = TeamPath(tuple(legs), (self.mission.start_time,) * len(legs))

@@ -206,7 +206,8 @@ def _read(facts: dict[str, Any], table: Table, make: Callable) -> TeamSolution:
         problem=None,
         members=tuple(members),
         names=names,
-        **found,
+        forces=found["forces"],
+        densities=found["densities"],
         **outcome_fields(facts),
         provenance=provenance_of(facts),
     )
