@@ -121,7 +121,7 @@ class Apart(Together):
     def needs(self, slack: float) -> str:
         # The row is |d|^2 / distance^2 >= 1 - slack.
         if slack >= 1:
-            return ""
+            return f"no distance to be kept (you gave {self.distance:g} m)"
         least = down(self.distance * float(np.sqrt(1 - slack)))
         return f"a distance of at most {least} m (you gave {self.distance:g} m)"
 

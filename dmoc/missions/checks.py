@@ -61,8 +61,10 @@ def fastest(leg: Solution) -> float:
     return float(np.linalg.norm(leg.velocity, axis=1).max(initial=0.0))
 
 
-def worst_of(names: Sequence[str], legs: Sequence[Evidence], check: Callable[[Evidence], Check]) -> Check:
-    """The check of the leg in which it is nearest to its limit, or beyond it."""
+def worst_of(
+    names: Sequence[str], legs: Sequence[Evidence], check: Callable[[Evidence], Check], named: bool = False
+) -> Check:
+    """The check of the leg in which it is nearest to its limit, or beyond it; an only leg is not `named`."""
     found = [check(leg) for leg in legs]
 
     def share(one: Check) -> float:
@@ -73,7 +75,7 @@ def worst_of(names: Sequence[str], legs: Sequence[Evidence], check: Callable[[Ev
         return one.value / one.limit if one.limit else 0.0
 
     worst = int(np.argmax([share(one) for one in found]))
-    if len(legs) == 1:
+    if len(legs) == 1 and not named:
         return found[0]
     name = names[worst]
     return replace(found[worst], note=f"{name}: {found[worst].note}" if found[worst].note else name)

@@ -33,19 +33,16 @@ FAR = 4.0
 
 def team_page(solution: TeamSolution, report: Report | None = None) -> Figure:
     """A matplotlib Figure of a team, whose settings are those of the caller."""
-    flat = solution.dimension or 3
-    page = new_page(flat)
-    lanes = [_draw_forces, _draw_speeds, _draw_distances] if solution.dimension else [_draw_rates]
+    page = new_page(solution.dimension)
+    lanes = (_draw_forces, _draw_speeds, _draw_distances)
     around = _around(solution)
     view = view_of(around, solution.position) if solution.dimension > 1 else None
     wide = view is not None and lies_wide(view)
-    path, panels = new_panels(page, flat, wide, len(lanes))
+    path, panels = new_panels(page, solution.dimension, wide, len(lanes))
     if view is not None:
         _draw_paths(path, solution, (around, view), wide)
-    elif solution.dimension:
-        _draw_lines(path, solution)
     else:
-        path.set_axis_off()
+        _draw_lines(path, solution)
     size, unit = readable(solution.time, "s")
     for panel, draw in zip(panels, lanes, strict=True):
         draw(panel, solution, size)
@@ -104,7 +101,7 @@ def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], bes
         _arrows(axes, tails / size, arrows / size, style["color"])
         if solution.dimension == 3:
             floor = np.full(len(curve), view[0][2])
-            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label="shadows", zorder=0)
+            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label="_shadow", zorder=0)
     if solution.dimension == 3:
         axes.computed_zorder = False
     frame(axes, view, unit)
@@ -175,14 +172,6 @@ def _draw_speeds(axes: Any, solution: TeamSolution, late: float) -> None:
     name = "velocities" if solution.dimension == 1 else "speeds"
     axes.set_ylabel(f"{name} [{unit}]")
     axes.set_title(name.capitalize())
-
-
-def _draw_rates(axes: Any, solution: TeamSolution, late: float) -> None:
-    """How fast bodies turn that have an attitude alone."""
-    for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
-        axes.plot(one.end_times / late, np.linalg.norm(np.asarray(one.rate), axis=1), label=name, **style)
-    axes.set_ylabel("rate [rad/s]")
-    axes.set_title("Rates of turn")
 
 
 def _draw_distances(axes: Any, solution: TeamSolution, late: float) -> None:

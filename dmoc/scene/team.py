@@ -130,8 +130,8 @@ class Team:
         return found
 
     def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:
-        """The transfer of a body by its own name, whose duration is known [s]."""
-        return replace(self.members[index], duration=duration, name=self.names[index])
+        """The transfer of a body by its own name: of a team time, mass and duration are its own."""
+        return replace(self.members[index], name=self.names[index])
 
     def _checked_names(self) -> tuple[str, ...]:
         count, given = len(self.members), entries(self.names)
@@ -171,29 +171,42 @@ class Team:
                 raise ValueError(
                     f"{type(part).__name__}: no body is called {name!r}; there are {', '.join(self.names)}"
                 )
-        if not all(self.members[i].start.has_position for pair in part.pairs(self.names) for i in pair):
-            raise ValueError(
-                f"{type(part).__name__} is about positions, but a body of the team has an attitude alone; "
-                "give its ends a position (Pose)"
-            )
 
     def _check_ends(self) -> None:
         """Ends that are fixed can neither be moved apart nor together."""
         for part, a, b in self.pairs():
-            both = f"{self.names[a]} and {self.names[b]}"
-            for end in ("start", "goal"):
-                place, speed = (self._gap(a, b, end, which) for which in (0, 1))
-                gap = float(np.linalg.norm(place))
-                if gap < part.distance_kept * (1 - 1e-9):
+            both, kept = f"{self.names[a]} and {self.names[b]}", part.distance_kept
+            start, goal = (self._gap(a, b, end, 0) for end in ("start", "goal"))
+            for verb, place in (("start", start), ("end", goal)):
+                if (gap := float(np.linalg.norm(place))) < kept * (1 - 1e-9):
                     raise ValueError(
-                        f"{both} {'start' if end == 'start' else 'end'} {gap:g} m apart, but are to keep "
-                        f"{part.distance_kept:g} m; move one of them or lessen the distance"
+                        f"{both} {verb} {gap:g} m apart, but are to keep {kept:g} m; move one of them or lessen "
+                        "the distance"
                     )
-                if end == "goal" and part.missed(place, speed) > 0:
-                    raise ValueError(
-                        f"{both} are to meet, but their goals are fixed and differ; leave one of them open, "
-                        "for example goal=Free()"
-                    )
+            if kept and len(start) == 1 and (start * goal < 0).all():
+                raise ValueError(
+                    f"{both} would have to pass through each other on a line, but are to keep {kept:g} m; move "
+                    "one of their goals"
+                )
+            if part.missed(goal, self._gap(a, b, "goal", 1)) > 0:
+                raise ValueError(
+                    f"{both} are to meet, but their goals are fixed and differ; leave one of them open, for "
+                    "example goal=Free()"
+                )
+            if kept and any({a, b} <= bodies for bodies in self.meetings()):
+                raise ValueError(
+                    f"{both} are to meet, but also to keep {kept:g} m; name in between whom each of the two is "
+                    "about"
+                )
+
+    def meetings(self) -> list[set[int]]:
+        """The bodies that are in one place at the end, place by place."""
+        found: list[set[int]] = []
+        for part, a, b in self.pairs():
+            if part.meets:
+                joined = [bodies for bodies in found if bodies & {a, b}]
+                found = [bodies for bodies in found if bodies not in joined] + [{a, b}.union(*joined)]
+        return found
 
     def _gap(self, a: int, b: int, end: str, which: int) -> np.ndarray:
         """The fixed place (0) or velocity (1) of a body at an end from that of another; NaN where one is free."""
@@ -214,5 +227,10 @@ def _member(index: int, given: Any) -> TransferProblem:
         raise ValueError(
             f"members[{index}] has links or several bodies of its own, and a body of a team has none; "
             "bodies that links join are one dmoc.System"
+        )
+    if not one.start.has_position:
+        raise ValueError(
+            f"members[{index}] has an attitude alone, and nothing can hold between it and others; give its ends a "
+            "position (Pose), or solve it by itself"
         )
     return one

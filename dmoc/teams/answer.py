@@ -16,6 +16,8 @@ from dmoc.results.solution import NOT_MET, Solution, reported
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.team import Team
 from dmoc.solver.rung import cut_short
+from dmoc.teams.cuts import team_cuts
+from dmoc.teams.path import TeamPath
 from dmoc.teams.solution import TeamSolution
 
 
@@ -68,7 +70,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         message,
         tuple(climb.levels),
         worst=() if success else worst_rows(program, answer, path),
-        warnings=_warnings(team, path.duration) if success else (),
+        warnings=_warnings(team, path) if success else (),
         tolerance=tol,
         error=error,
         reason=f"{len(members)} bodies on {len(path.mesh) - 1} steps",
@@ -92,9 +94,16 @@ def _member(problem: TransferProblem, path: Any, cost: float, level: Level, stat
     )
 
 
-def _warnings(team: Team, duration: float) -> tuple[str, ...]:
-    bound = team.members[0].limit_of_duration(duration)
-    if bound is None:
-        return ()
-    other = "shorter" if bound == "shortest" else "longer"
-    return (f"the duration ends on its {bound} limit of {lasting(duration, 6)}: a {other} one may cost less",)
+def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
+    found = []
+    bound = team.members[0].limit_of_duration(path.duration)
+    if bound is not None:
+        other = "shorter" if bound == "shortest" else "longer"
+        ends = f"the duration ends on its {bound} limit of {lasting(path.duration, 6)}"
+        found.append(f"{ends}: a {other} one may cost less")
+    worst = max(
+        (cut for cut in team_cuts(team, path) if len(cut.steps)), key=lambda cut: cut.value, default=None
+    )
+    if worst is not None:
+        found.append(f"{worst.name} is broken by {worst.value:.3g} m: try another guess or a finer mesh")
+    return tuple(found)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.checks.evidence import Evidence
@@ -36,12 +37,13 @@ def verify_team(solution: TeamSolution, problem: Any = None, more: Sequence = ()
         undefined = next((found for one in bodies if (found := one.undefined())), "")
         if undefined:
             return Report((Check("bodies", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
-        turning = any(one.path.attitudes for one in bodies)
-        checks = [
-            worst_of(solution.names, bodies, check)
-            for name, check in CHECKS.items()
-            if name != "optimality" and (turning or name != "constraint")
-        ]
+        checks = []
+        for name, check in CHECKS.items():
+            # Only bodies that turn have a constraint.
+            ours = [i for i, one in enumerate(bodies) if name != "constraint" or one.path.attitudes]
+            if ours and name != "optimality":
+                names = [solution.names[i] for i in ours]
+                checks.append(worst_of(names, [bodies[i] for i in ours], check, named=True))
         checks.append(_together(solution, bodies))
         path = solution.path
         whole = Whole(solution, TeamProgram.of(team, team.stretches, path), path)
@@ -58,7 +60,7 @@ def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
         sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
         ends = [one.path.place[-1] for one in pair]
         speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in pair]
-        for row in part.goal_rows(ends[1] - ends[0], speeds[1] - speeds[0]):
+        for row in part.goal_rows(ca.DM(ends[1] - ends[0]), ca.DM(speeds[1] - speeds[0])):
             value = float(row.expression)
             beyond = max(row.lower - value, value - row.upper, 0.0) if np.isfinite(value) else np.nan
             found.append(Excess(f"{name} {row.name}", beyond, BOUND * sizes[row.unit], row.unit))

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
+import numpy as np
+
 from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.guess import mesh_around
 from dmoc.missions.path import MissionPath, cold
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
@@ -14,7 +18,7 @@ from dmoc.scene.team import Team
 from dmoc.solver.solve import check_numerics
 from dmoc.teams.answer import answered
 from dmoc.teams.cuts import leapt
-from dmoc.teams.guess import guessed
+from dmoc.teams.guess import bent_apart, guessed, other_sides
 from dmoc.teams.path import TeamPath
 from dmoc.teams.program import TeamProgram
 from dmoc.teams.solution import TeamSolution
@@ -26,6 +30,8 @@ ORDER = 4
 STEPS = {2: 120, 4: 30, 6: 20, 8: 15}
 # Steps in which two bodies come too near between nodes are cut in two at most so many times.
 MOST_CUT = 4
+# Where they leap through each other between nodes after that, so many other ways round are tried.
+MOST_SIDES = 4
 # Steps in which two bodies touch are cut in two so many times.
 SHARPENED = 3
 
@@ -66,6 +72,17 @@ class TeamClimb(Climb):
                 return found if found.answer.status == "stopped" else attempt
             attempt = found
         return attempt
+
+    def round_the_other_way(self, attempt: Attempt, path: TeamPath) -> Attempt:
+        """An answer from a guess on which bodies pass on other sides, where they leap through each other here."""
+        team, answer = self.mission, attempt
+        straight = guessed(team, (path.mesh, path.order, path.legs[0].hold), bent=False)
+        for sides in islice(other_sides(team, straight), 1, MOST_SIDES):
+            if not len(leapt(team, answer.path)) or self.interrupt.seen:
+                break
+            tried = self.from_guess(bent_apart(team, straight, sides))
+            answer = self.unleapt(tried) if tried.solved else answer
+        return attempt if len(leapt(team, answer.path)) else answer
 
     def sharpened(self, attempt: Attempt) -> Attempt:
         """The answer on a mesh that is finer where two bodies touch, if that is found."""
@@ -108,6 +125,8 @@ def solve_team(
             return answered(climb, first)
         found, error, met = climb.refined(first, tol)
         found = climb.unleapt(found) if met else found
+        if found.solved and not path.warm:
+            found = climb.round_the_other_way(found, path)
         return answered(climb, climb.sharpened(found) if tol is None else found, error, met, tol)
 
 
@@ -125,7 +144,16 @@ def first_path(
         same = given.mesh if steps is None else uniform_mesh(steps)
         return given.onto([(same if mesh is None else check_mesh(None, mesh), order or given.order)])
     ends = uniform_mesh(steps or STEPS[this]) if mesh is None else check_mesh(None, mesh)
-    return guessed(team, (ends, this, hold), given)
+    path = guessed(team, (ends, this, hold), given)
+    if mesh is not None:
+        return path
+    # Steps of equal angles for the body that needs most of them around an attractor.
+    around = [
+        mesh_around(problem, leg.place, leg.fractions, leg.duration, this, STEPS[this], steps)
+        for problem, leg in zip(team.members, path.legs, strict=True)
+    ]
+    finest = max(around, key=len)
+    return path if np.array_equal(finest, ends) else guessed(team, (finest, this, hold), given)
 
 
 def _check_fits(team: Team, path: TeamPath) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath
 from dmoc.results.between import Cut, cuts
@@ -22,7 +23,10 @@ def team_cuts(team: Team, path: TeamPath) -> Iterator[Cut]:
     One body, as another one sees it, moves on a path past a zone around the origin: it is judged as by
     `dmoc.results.between.cuts`.
     """
-    slopes = [_node_velocities(*one) for one in zip(team.members, path.legs, strict=True)]
+    slopes = [
+        _node_slopes(problem, leg)[:, leg.coordinates.places]
+        for problem, leg in zip(team.members, path.legs, strict=True)
+    ]
     speeds = [np.linalg.norm(slope, axis=1).max() for slope in slopes]
     for name, (part, a, b) in zip(team.pair_names(), team.pairs(), strict=True):
         if (limit := part.limit(team.dimension)) is None:
@@ -36,15 +40,20 @@ def team_cuts(team: Team, path: TeamPath) -> Iterator[Cut]:
 
 
 def leapt(team: Team, path: TeamPath) -> np.ndarray:
-    """The steps in which two bodies come nearer than is allowed between nodes."""
+    """The steps in which two bodies come nearer than is allowed between nodes, or one leaps into a zone."""
     found = [cut.steps for cut in team_cuts(team, path)]
+    for problem, leg in zip(team.members, path.legs, strict=True):
+        if problem.constraints:
+            slopes = _node_slopes(problem, leg)
+            speed = float(np.linalg.norm(slopes[:, leg.coordinates.places], axis=1).max())
+            scales = leg.diagonal or 1.0, speed, problem.start_time
+            found += [cut.steps for cut in cuts(problem.constraints, leg, slopes, *scales)]
     return np.unique(np.concatenate([np.empty(0, int), *found]))
 
 
-def _node_velocities(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
-    """The velocity of the centre of mass at every node [m/s]."""
+def _node_slopes(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    """dq/dt at every node, that of places in [m/s]."""
     dynamics = Dynamics.of(problem)
     _, velocity = end_momenta(dynamics, path, problem.start_time)
-    ends = slice(None, None, (len(path.position) - 1) // (len(path.mesh) - 1))
-    slopes = node_velocities(path, velocity_along(dynamics, path.position[ends], velocity))
-    return slopes[:, path.coordinates.places]
+    ends = slice(None, None, scheme(path.order).degree)
+    return node_velocities(path, velocity_along(dynamics, path.position[ends], velocity))

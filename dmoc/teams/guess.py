@@ -65,8 +65,7 @@ def _each(team: Team, given: Any) -> tuple:
 def meeting_places(team: Team, duration: float) -> list[Any]:
     """Where each body may meet others, or None: a place that is given, else the middle of where they end."""
     found: list[Any] = [None] * len(team.members)
-    for part in team.together:
-        bodies = sorted({i for pair in part.pairs(team.names) for i in pair}) if part.meets else []
+    for bodies in map(sorted, team.meetings()):
         ends = [_end(team.members[i], duration) for i in bodies]
         given = [place for place, known in ends if known]
         for i, (_, known) in zip(bodies, ends, strict=True):
