@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 from dmoc.basics.digits import lasting
@@ -69,7 +69,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         status,
         message,
         tuple(climb.levels),
-        worst=() if success else worst_rows(program, answer, path),
+        worst=() if success else _worst(team, worst_rows(program, answer, path)),
         warnings=_warnings(team, path) if success else (),
         tolerance=tol,
         error=error,
@@ -92,6 +92,20 @@ def _member(problem: TransferProblem, path: Any, cost: float, level: Level, stat
         ladder=(level,),
         provenance=Provenance.of(problem),
     )
+
+
+def _worst(team: Team, rows: Sequence[tuple[str, float, str]]) -> tuple[tuple[str, float, str], ...]:
+    """Violated rows with those at the nodes of two bodies as what they lack of their distance [m]."""
+    kept = {
+        f"{name}[": limit
+        for name, (part, *_) in zip(team.pair_names(), team.pairs(), strict=True)
+        if (limit := part.limit(team.dimension)) is not None
+    }
+    found = []
+    for name, size, unit in rows:
+        limit = next((limit for start, limit in kept.items() if name.startswith(start)), None)
+        found.append((name, *((size, unit) if limit is None else limit.violation(size, ""))))
+    return tuple(found)
 
 
 def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:

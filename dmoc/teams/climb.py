@@ -13,12 +13,13 @@ from dmoc.missions.guess import mesh_around
 from dmoc.missions.path import MissionPath, cold
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
+from dmoc.parts.objectives import Effort
 from dmoc.results.facts import Error
 from dmoc.scene.team import Team
-from dmoc.solver.solve import check_numerics
+from dmoc.solver.solve import check_numerics, solve
 from dmoc.teams.answer import answered
 from dmoc.teams.cuts import leapt
-from dmoc.teams.guess import bent_apart, guessed, other_sides
+from dmoc.teams.guess import aimed, bent_apart, guessed, other_sides
 from dmoc.teams.path import TeamPath
 from dmoc.teams.program import TeamProgram
 from dmoc.teams.solution import TeamSolution
@@ -73,6 +74,20 @@ class TeamClimb(Climb):
             attempt = found
         return attempt
 
+    def from_own_answers(self, attempt: Attempt, path: TeamPath) -> Attempt:
+        """An answer from paths that every body would take by itself, if all of them have one, bent apart."""
+        team, legs = self.mission, []
+        for problem, leg in zip(aimed(team, path.duration), path.legs, strict=True):
+            if problem.free_duration:
+                # All of them must last equally long.
+                problem = replace(problem, duration=path.duration, objective=Effort())
+            found = solve(problem, order=path.order, mesh=path.mesh, hold=leg.hold, guess=leg)
+            if not found.success or self.interrupt.seen:
+                return attempt
+            legs.append(replace(found.path, multipliers={}))
+        tried = self.from_guess(bent_apart(team, replace(path, legs=tuple(legs))))
+        return tried if tried.solved else attempt
+
     def round_the_other_way(self, attempt: Attempt, path: TeamPath) -> Attempt:
         """An answer from a guess on which bodies pass on other sides, where they leap through each other here."""
         team, answer = self.mission, attempt
@@ -116,6 +131,8 @@ def solve_team(
     path = first_path(team, order, steps, hold, guess, mesh)
     with climb.interrupt:
         first = climb.attempt(path) if path.warm else climb.from_guess(path)
+        if not (first.solved or path.warm or climb.interrupt.seen):
+            first = climb.from_own_answers(first, path)
         if not first.solved:
             first = climb.explained(path, first)
         if not first.solved:

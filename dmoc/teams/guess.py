@@ -33,18 +33,17 @@ def guessed(
     """A guess on a mesh, order and kind of control: each body's own, bent apart from those of the others.
 
     Two bodies that change places head-on have a path through each other as their guess. There both ways round
-    are equally near, the gradient of their distance across the path is zero, and every step of the optimiser
-    keeps to the line; nothing but a bend to one side can tell it which way round to go. So they are bent
-    sideways, each to its own left (in space, around the axis that they move along least): a team that meets in
-    one place then turns around it as on a roundabout. `sides` has -1 for pairs that pass on the other side.
+    are equally near: the gradient of their distance has no part across the path, and every step of the optimiser
+    keeps to the line until rounding errors break the tie, after 210 iterations instead of 10 and to a side that
+    nobody can foretell. So they are bent sideways, each to its own left (in space, around the axis that they move
+    along least): a team that crosses in one place then turns around it as on a roundabout. `sides` has -1 for
+    pairs that pass on the other side.
     """
-    parts = _each(team, given)
-    duration = max(map(guess_duration, team.members))
-    aims = meeting_places(team, duration)
-    legs = []
-    for i, (problem, mine) in enumerate(zip(team.members, parts, strict=True)):
-        aimed = problem if aims[i] is None or problem.turns else replace(problem, goal=State(aims[i], None))
-        legs.append(starting_guess(aimed, *numerics, mine, duration))
+    parts, duration = _each(team, given), max(map(guess_duration, team.members))
+    legs = [
+        starting_guess(problem, *numerics, mine, duration)
+        for problem, mine in zip(aimed(team, duration), parts, strict=True)
+    ]
     start = TeamPath(tuple(legs), (team.start_time,) * len(legs))
     return bent_apart(team, start, sides) if bent else start
 
@@ -62,24 +61,33 @@ def _each(team: Team, given: Any) -> tuple:
     return found
 
 
-def meeting_places(team: Team, duration: float) -> list[Any]:
-    """Where each body may meet others, or None: a place that is given, else the middle of where they end."""
-    found: list[Any] = [None] * len(team.members)
+def aimed(team: Team, duration: float) -> list[TransferProblem]:
+    """The transfers of all bodies, each by itself, where they meet nobody; they last about `duration` [s].
+
+    Those that are to meet go to a place that one of their goals says; else to the middle of where they would be
+    or, where something attracts them, to where the first of them coasts: the middle of two orbits is on neither.
+    """
+    found = list(team.members)
     for bodies in map(sorted, team.meetings()):
-        ends = [_end(team.members[i], duration) for i in bodies]
-        given = [place for place, known in ends if known]
-        for i, (_, known) in zip(bodies, ends, strict=True):
-            if not known:
-                found[i] = tuple(given[0] if given else np.mean([place for place, _ in ends], axis=0))
+        ends = {i: _end(team.members[i], duration) for i in bodies}
+        given = [state for state, known in ends.values() if known]
+        states = given or [state for state, _ in ends.values()]
+        drawn = any(team.members[i].attraction.sources for i in bodies)
+        first = bool(given) or drawn
+        place, velocity = states[0] if first else (np.mean([place for place, _ in states], axis=0), None)
+        for i, (_, known) in ends.items():
+            if not known and not found[i].turns:
+                aim = None if velocity is None or np.isnan(velocity).any() else tuple(velocity)
+                found[i] = replace(found[i], goal=State(tuple(place), aim))
     return found
 
 
-def _end(problem: TransferProblem, duration: float) -> tuple[np.ndarray, bool]:
-    """Where a body would end [m], and whether its own goal says so."""
-    (begin, _), (place, _) = end_estimates(problem, duration)
+def _end(problem: TransferProblem, duration: float) -> tuple[tuple[np.ndarray, np.ndarray], bool]:
+    """Where a body would end and how fast [m], [m/s], and whether its own goal says where."""
+    (begin, _), (place, velocity) = end_estimates(problem, duration)
     known = not np.isnan(problem.goal.point.estimate(problem.start_time + duration)[0]).any()
     begin = np.where(np.isnan(begin), 0.0, begin)
-    return np.where(np.isnan(place), begin, place), known
+    return (np.where(np.isnan(place), begin, place), velocity), known
 
 
 def bent_apart(team: Team, path: TeamPath, sides: Sequence[int] = ()) -> TeamPath:
