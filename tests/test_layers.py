@@ -123,6 +123,7 @@ def test_the_front_loads_nothing_heavy():
     assert done.stdout.split() == []
 
 
+TEAMS = ["dmoc.scene.team", "dmoc.legs.together", "dmoc.teams.program", "dmoc.teams.solution"]
 HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
 
 
@@ -130,7 +131,7 @@ HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
     "arguments, unused",
     [
         # force-free, coasts, a spiral to an orbit, an orbit that winds, three bodies
-        ("free_flyer", [*HEAVY, "dmoc.links.joints", "dmoc.links.along", "dmoc.guess.turning"]),
+        ("free_flyer", [*HEAVY, "dmoc.links.joints", "dmoc.links.along", "dmoc.guess.turning", *TEAMS]),
         ("two_body_fuel", HEAVY),
         ("leo_raise --order 4", HEAVY),
         ("dionysus --json", [*HEAVY, "rich.console"]),

@@ -1,4 +1,4 @@
-"""What a user calls: it takes a transfer or a mission, and does for each what is made for it."""
+"""What a user calls: it takes a transfer, a mission or a team, and does for each what is made for it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver import solve as transfer_solver
 
-# What missions are made of is loaded for them alone.
+# What missions and teams are made of is loaded for them alone.
 if TYPE_CHECKING:
     from dmoc.missions.solution import MissionSolution
     from dmoc.scene.mission import Mission
+    from dmoc.scene.team import Team
+    from dmoc.teams.solution import TeamSolution
 
 # A file of a mission says that it has this format.
 MISSION = "dmoc mission"
@@ -49,7 +51,7 @@ def solve(
 
 @overload
 def solve(
-    problem: TransferProblem | Mission,
+    problem: TransferProblem | Mission | Team,
     order: int | None = ...,
     steps: int | None = ...,
     tol: float | None = ...,
@@ -67,7 +69,7 @@ def solve(
 
 
 def solve(
-    problem: TransferProblem | Mission,
+    problem: TransferProblem | Mission | Team,
     order: int | None = None,
     steps: int | None = None,
     tol: float | None = None,
@@ -82,7 +84,7 @@ def solve(
     structure: bool = False,
     impulses: str | None = None,
 ) -> Any:
-    """Solve a transfer problem or a mission, coarse to fine.
+    """Solve a transfer problem, a mission or a team, coarse to fine.
 
     With `structure=True` a transfer is solved by its structure: the burns, coasts, singular arcs, touches of
     zones and ways along limits of a coarse answer become the legs of a mission with free ends, in each of which
@@ -92,7 +94,7 @@ def solve(
 
     Parameters
     ----------
-    problem : TransferProblem or Mission
+    problem : TransferProblem, Mission or Team
     order : int
         2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
         motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
@@ -100,7 +102,8 @@ def solve(
     steps : int
         Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8, and over many
         revolutions as many as these need. Or `mesh`: the step ends as increasing fractions 0..1. Of a
-        mission the order is 6, and the steps are those of each leg.
+        mission the order is 6, and the steps are those of each leg; of a team they are 4 and 30, the mesh is
+        one for all bodies, and steps in which two of them touch are cut.
     tol : float
         Relative error [-] of path and objective to reach instead: mesh, and the order if it is not
         given, follow from it; `steps` is then where to begin.
@@ -131,7 +134,7 @@ def solve(
 
     Returns
     -------
-    Solution or MissionSolution
+    Solution, MissionSolution or TeamSolution
         Whether it succeeded or not; `raise_for_status()` raises if not.
 
     Raises
@@ -183,8 +186,8 @@ def _by_structure(
 
 
 def verify(
-    solution: Solution | MissionSolution,
-    problem: TransferProblem | Mission | None = None,
+    solution: Solution | MissionSolution | TeamSolution,
+    problem: TransferProblem | Mission | Team | None = None,
     more: Sequence[Callable] = (),
 ) -> Report:
     if hasattr(solution, "members"):

@@ -7,7 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmoc import Apart, BallForce, Drag, Free, Meet, State, Team, TransferProblem, UniformAtmosphere, solve, verify
+from dmoc import (
+    Apart,
+    BallForce,
+    Drag,
+    Free,
+    Meet,
+    State,
+    Team,
+    TransferProblem,
+    UniformAtmosphere,
+    solve,
+    verify,
+)
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta

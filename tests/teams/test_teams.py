@@ -61,7 +61,8 @@ def ring(count, distance=0.35, duration=10.0, **more):
     """Bodies of 1 kg on a circle of radius 1 that go to the opposite side."""
     places = [(np.cos(a), np.sin(a)) for a in 2 * np.pi * np.arange(count) / count]
     robots = [
-        TransferProblem(1.0, at_rest(*place), at_rest(*(-x for x in place)), duration, **more) for place in places
+        TransferProblem(1.0, at_rest(*place), at_rest(*(-x for x in place)), duration, **more)
+        for place in places
     ]
     return Team(robots, [Apart(distance)])
 
@@ -85,7 +86,9 @@ def test_a_meeting_has_the_order_of_the_scheme():
     spring = [dmoc.Spring(0.4, (0, 0))]
     best = solve(meeting([Meet()], effects=spring), order=8, steps=16).objective
     for order, steps in ((2, (16, 32)), (4, (8, 16)), (6, (4, 8))):
-        errors = [abs(solve(meeting([Meet()], effects=spring), order=order, steps=n).objective - best) for n in steps]
+        errors = [
+            abs(solve(meeting([Meet()], effects=spring), order=order, steps=n).objective - best) for n in steps
+        ]
         assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
@@ -129,7 +132,10 @@ def test_three_robots_have_the_optimum_of_splines_through_the_touches():
     fine = solve(team, tol=1e-7)
     assert fine.success and fine.objective == pytest.approx(THREE, rel=1e-7)
     assert abs(fine.objective / THREE - 1) < fine.error.objective
-    touched = fine.time[fine.distance("east", "north").argmin()], fine.time[fine.distance("west", "north").argmin()]
+    touched = (
+        fine.time[fine.distance("east", "north").argmin()],
+        fine.time[fine.distance("west", "north").argmin()],
+    )
     assert touched == pytest.approx((13.885026, 16.114974), abs=2e-3)
 
 
@@ -211,7 +217,9 @@ def test_bodies_of_other_kinds_are_a_team():
     report = verify(found)
     assert found.success and all(check.ok for check in report.checks) and "body 1" in report["constraint"].note
     burning = [
-        TransferProblem(10.0, at_rest(-x, 0), at_rest(x, 0), 30.0, actuator=Engine(0.2, 200.0), objective=Fuel())
+        TransferProblem(
+            10.0, at_rest(-x, 0), at_rest(x, 0), 30.0, actuator=Engine(0.2, 200.0), objective=Fuel()
+        )
         for x in (1.0, -1.0)
     ]
     found = solve(Team(burning, [Apart(0.4)]))
@@ -375,7 +383,9 @@ def test_orbits_take_as_many_steps_as_their_revolutions_need():
     def circling(radius, angle):
         place = radius * np.cos(angle), radius * np.sin(angle)
         speed = -np.sin(angle) / radius**0.5, np.cos(angle) / radius**0.5
-        return TransferProblem(1.0, State(place, speed), Free(), 14.0, effects=[PointGravity(1.0)], objective=Effort())
+        return TransferProblem(
+            1.0, State(place, speed), Free(), 14.0, effects=[PointGravity(1.0)], objective=Effort()
+        )
 
     team = Team([circling(1.0, 0.0), circling(1.3, 1.0)], [Meet()])
     assert len(first_path(team, None, None, False).mesh) > 31
