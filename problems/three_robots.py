@@ -1,9 +1,9 @@
 """Let two robots change places while a third one crosses between them, all kept apart, least effort.
 
-On straight lines all three would be in the middle at one time. At the best path the third one touches the distance
-to each of the others once, at 13.885 s and 16.115 s, and effort is 1.80540487595 N^2 s: so say cubic splines through
-those two places, the best of them at the worst times, and order 8 with steps cut where bodies touch. The same on the
-other side of the middle costs as much; other ways round cost 2.10 and 2.84.
+On straight lines all three would be in the middle at one time. At the best path the third one touches the
+distance to each of the others once, at 13.885 s and 16.115 s, and the effort is 1.80540487595 N^2 s: so say
+cubic splines through those two places, the best of them at the worst times, and order 8 with steps cut where
+they touch. The same on the other side of the middle costs as much; other ways round cost 2.10 and 2.84.
 """
 
 from dmoc import Apart, State, Team, TransferProblem

@@ -1,7 +1,7 @@
 """Why a mission or a team is not met: limits that give way, one by one or together, or its rows.
 
-They are those of legs and impulses, or of bodies and between them. The program of a mission or a team comes from
-above; what is asked of it here is what `Relaxation` asks of an NLP.
+They are those of legs and impulses, or of bodies and between them. The program of a mission or a team comes
+from above; what is asked of it here is what `Relaxation` asks of an NLP.
 """
 
 from __future__ import annotations

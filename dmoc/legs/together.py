@@ -55,7 +55,7 @@ class Together(ABC):
         return None
 
     def missed(self, apart: np.ndarray, drift: np.ndarray) -> float:
-        """By how much goals break it whose entries are fixed [m or m/s]; NaN stands for an entry that is free."""
+        """By how much goals with fixed entries break it [m or m/s]; NaN stands for an entry that is free."""
         return 0.0
 
     @property
@@ -86,8 +86,8 @@ class Together(ABC):
 class Apart(Together):
     """Every two bodies keep a distance all along.
 
-    Rows act at the nodes that the bodies share; between nodes it is treated as a `KeepOut` of that radius around
-    either of them, which moves along.
+    Rows act at the nodes that the bodies share; between nodes it is treated as a `KeepOut` of that radius
+    around either of them, which moves along.
 
     Parameters
     ----------

@@ -180,8 +180,8 @@ class Team:
             for verb, place in (("start", start), ("end", goal)):
                 if (gap := float(np.linalg.norm(place))) < kept * (1 - 1e-9):
                     raise ValueError(
-                        f"{both} {verb} {gap:g} m apart, but are to keep {kept:g} m; move one of them or lessen "
-                        "the distance"
+                        f"{both} {verb} {gap:g} m apart, but are to keep {kept:g} m; move one of them or "
+                        "lessen the distance"
                     )
             if kept and len(start) == 1 and (start * goal < 0).all():
                 raise ValueError(
@@ -209,7 +209,7 @@ class Team:
         return found
 
     def _gap(self, a: int, b: int, end: str, which: int) -> np.ndarray:
-        """The fixed place (0) or velocity (1) of a body at an end from that of another; NaN where one is free."""
+        """The place (0) or velocity (1) of a body at an end from another one's; NaN where one is free."""
         first, second = (getattr(self.members[i], end).point.fixed()[which] for i in (a, b))
         return second - first
 
@@ -230,7 +230,7 @@ def _member(index: int, given: Any) -> TransferProblem:
         )
     if not one.start.has_position:
         raise ValueError(
-            f"members[{index}] has an attitude alone, and nothing can hold between it and others; give its ends a "
-            "position (Pose), or solve it by itself"
+            f"members[{index}] has an attitude alone, and nothing can hold between it and others; give its "
+            "ends a position (Pose), or solve it by itself"
         )
     return one

@@ -26,8 +26,8 @@ def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Tr
     problem = getattr(problem, "alone", None) or problem
     if hasattr(problem, "together"):
         raise ValueError(
-            "a team of bodies cannot be simulated as a whole; simulate its members, each with its own solution: "
-            "dmoc.simulate(team.members[0], solution.members[0])"
+            "a team of bodies cannot be simulated as a whole; simulate its members, each with its own "
+            "solution: dmoc.simulate(team.members[0], solution.members[0])"
         )
     if not hasattr(problem, "joints"):
         return march.simulate(problem, controls, *given, **more)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -56,14 +56,7 @@ def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
     team, path = solution.require_problem(), solution.path
     found = [Excess(cut.name, cut.value, cut.allowed, cut.unit) for cut in team_cuts(team, path)]
     for name, (part, a, b) in zip(team.pair_names(), team.pairs(), strict=True):
-        pair = bodies[a], bodies[b]
-        sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
-        ends = [one.path.place[-1] for one in pair]
-        speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in pair]
-        for row in part.goal_rows(ca.DM(ends[1] - ends[0]), ca.DM(speeds[1] - speeds[0])):
-            value = float(row.expression)
-            beyond = max(row.lower - value, value - row.upper, 0.0) if np.isfinite(value) else np.nan
-            found.append(Excess(f"{name} {row.name}", beyond, BOUND * sizes[row.unit], row.unit))
+        found += _rows_between(name, part, (bodies[a], bodies[b]))
     durations = np.array([one.duration for one in path.legs])
     found.append(Excess("common duration", float(np.ptp(durations)), BOUND * path.duration, "s"))
     shortest, longest = team.duration_bounds
@@ -72,3 +65,21 @@ def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
     worst = max(found, key=lambda one: one.share)
     note = f"worst: {worst.name}" if worst.share > 0 else "all hold"
     return Check.of("together", worst.value, worst.allowed, worst.unit, note)
+
+
+def _rows_between(name: str, part: Any, pair: tuple[Evidence, Evidence]) -> Iterator[Excess]:
+    """The rows of a part for two bodies: at the end, and at the nodes if no limit of it was looked at there."""
+    first, second = pair
+    sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
+    apart = second.path.place - first.path.place
+    speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in pair]
+    q, v = (ca.SX.sym(of, apart.shape[1]) for of in "qv")
+    for rows, places, drift, where in (
+        (part.rows(q) if part.limit(q.numel()) is None else [], apart, np.zeros_like(apart), " at nodes"),
+        (part.goal_rows(q, v), apart[-1:], (speeds[1] - speeds[0])[None], ""),
+    ):
+        for row in rows:
+            have = ca.Function("row", [q, v], [ca.densify(ca.SX(row.expression))])(places.T, drift.T).full()
+            beyond = float(np.max(np.maximum(row.lower - have, have - row.upper), initial=0.0))
+            allowed = BOUND * sizes.get(row.unit, 1.0)
+            yield Excess(f"{name} {row.name}{where}", beyond, allowed, row.unit or "-")

@@ -16,7 +16,8 @@ from dmoc.nlp.transcription import check_mesh
 from dmoc.parts.objectives import Effort
 from dmoc.results.facts import Error
 from dmoc.scene.team import Team
-from dmoc.solver.solve import check_numerics, solve
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.solve import check_numerics
 from dmoc.teams.answer import answered
 from dmoc.teams.cuts import leapt
 from dmoc.teams.guess import aimed, bent_apart, guessed, other_sides
@@ -81,23 +82,31 @@ class TeamClimb(Climb):
             if problem.free_duration:
                 # All of them must last equally long.
                 problem = replace(problem, duration=path.duration, objective=Effort())
-            found = solve(problem, order=path.order, mesh=path.mesh, hold=leg.hold, guess=leg)
-            if not found.success or self.interrupt.seen:
+            ladder = Ladder(problem, self.options, compiled=self.compiled)
+            ladder.interrupt = self.interrupt
+            rung = ladder.climb_to(leg, leg)
+            if not rung.solved:
                 return attempt
-            legs.append(replace(found.path, multipliers={}))
+            legs.append(replace(rung.path, multipliers={}))
         tried = self.from_guess(bent_apart(team, replace(path, legs=tuple(legs))))
         return tried if tried.solved else attempt
 
     def round_the_other_way(self, attempt: Attempt, path: TeamPath) -> Attempt:
-        """An answer from a guess on which bodies pass on other sides, where they leap through each other here."""
+        """An answer on which bodies pass on other sides, where they leap through each other on this one."""
         team, answer = self.mission, attempt
+        had: Any = attempt.path
+        if not len(leapt(team, had)):
+            return attempt
         straight = guessed(team, (path.mesh, path.order, path.legs[0].hold), bent=False)
         for sides in islice(other_sides(team, straight), 1, MOST_SIDES):
-            if not len(leapt(team, answer.path)) or self.interrupt.seen:
-                break
             tried = self.from_guess(bent_apart(team, straight, sides))
-            answer = self.unleapt(tried) if tried.solved else answer
-        return attempt if len(leapt(team, answer.path)) else answer
+            answer = self.unleapt(tried) if tried.solved else tried
+            found: Any = answer.path
+            if answer.solved and not len(leapt(team, found)):
+                return answer
+            if self.interrupt.seen:
+                break
+        return attempt
 
     def sharpened(self, attempt: Attempt) -> Attempt:
         """The answer on a mesh that is finer where two bodies touch, if that is found."""

@@ -32,12 +32,12 @@ def guessed(
 ) -> TeamPath:
     """A guess on a mesh, order and kind of control: each body's own, bent apart from those of the others.
 
-    Two bodies that change places head-on have a path through each other as their guess. There both ways round
-    are equally near: the gradient of their distance has no part across the path, and every step of the optimiser
-    keeps to the line until rounding errors break the tie, after 210 iterations instead of 10 and to a side that
-    nobody can foretell. So they are bent sideways, each to its own left (in space, around the axis that they move
-    along least): a team that crosses in one place then turns around it as on a roundabout. `sides` has -1 for
-    pairs that pass on the other side.
+    Two bodies that change places head-on have a path through each other as their guess. There both ways
+    round are equally near: the gradient of their distance has no part across the path, and every step of the
+    optimiser keeps to the line until rounding errors break the tie, after 210 iterations instead of 10 and to
+    a side that nobody can foretell. So they are bent sideways, each to its own left (in space, around the axis
+    that they move along least): a team that crosses in one place then turns around it as on a roundabout.
+    `sides` has -1 for pairs that pass on the other side.
     """
     parts, duration = _each(team, given), max(map(guess_duration, team.members))
     legs = [
@@ -64,8 +64,9 @@ def _each(team: Team, given: Any) -> tuple:
 def aimed(team: Team, duration: float) -> list[TransferProblem]:
     """The transfers of all bodies, each by itself, where they meet nobody; they last about `duration` [s].
 
-    Those that are to meet go to a place that one of their goals says; else to the middle of where they would be
-    or, where something attracts them, to where the first of them coasts: the middle of two orbits is on neither.
+    Those that are to meet go to a place that one of their goals says; else to the middle of where they would
+    be or, where something attracts them, to where the first of them coasts: the middle of two orbits is on
+    neither.
     """
     found = list(team.members)
     for bodies in map(sorted, team.meetings()):

@@ -394,7 +394,7 @@ def as_team(part):
 
 def try_making(name, argument, value):
     part = answered(lambda: getattr(dmoc, name)(**(MAKES[name] | {argument: value})))
-    if part is None or any(answered(lambda: made(part)) is not None for made in (as_mission, as_team)):
+    if part is None or answered(lambda: as_mission(part) or as_team(part)) is not None:
         return
     if isinstance(part, (Mission, Leg, Event, Free, Team, Together)):
         return

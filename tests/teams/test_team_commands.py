@@ -62,7 +62,7 @@ def test_a_team_is_solved_saved_drawn_checked_and_drawn_again(folder, capsys):
     assert code == SOLVED and "not attached" not in (folder / "again.svg").read_text()
     code, said = run(capsys, "solve", "swap.py", "--guess", "flight.nc", "--quiet")
     assert code == SOLVED
-    with pytest.raises(ValueError, match="must be a dmoc.Team"):
+    with pytest.raises(ValueError, match=r"must be a dmoc\.Team"):
         load("flight.nc").attach(3)
 
 

@@ -51,7 +51,10 @@ def at_rest(*place):
     return State(place, (0.0,) * len(place))
 
 
-def meeting(together, duration=SPAN, goals=(Free(), Free()), **more):
+ANYWHERE = Free(), Free()
+
+
+def meeting(together, duration=SPAN, goals=ANYWHERE, **more):
     starts = at_rest(0, 0), at_rest(GAP, 0)
     bodies = zip((NEAR, FAR), starts, goals, strict=True)
     return Team([TransferProblem(m, start, goal, duration, **more) for m, start, goal in bodies], together)
