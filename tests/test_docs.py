@@ -121,7 +121,7 @@ def between(names):
     assert together.distance("body 1", "body 2").max() == pytest.approx(1.5, rel=1e-6)
     assert dmoc.verify(together).ok
     verdict = dmoc.verify(together, replace(together.problem, together=(names["InRange"](1.4),)))["together"]
-    assert not verdict.ok and verdict.note == "worst: inrange body 1 and body 2 range at nodes"
+    assert not verdict.ok and verdict.note == "worst: in range body 1 and body 2 range at nodes"
     assert together.problem.together[0].words() == "all bodies stay within 1.5 m"
 
 

@@ -27,7 +27,7 @@ BODY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9")
 MOMENTS = 5
 # A legend has room for so many pairs; more are drawn in grey, and the nearest of all in a colour.
 MOST_PAIRS = 6
-# Distances that grow much larger are drawn up to so many times the largest that is to be kept [-].
+# Distances that grow much larger are drawn up to so many times what is to be kept, or the least of all [-].
 FAR = 4.0
 
 
@@ -198,7 +198,7 @@ def _draw_distances(axes: Any, solution: TeamSolution, late: float) -> None:
     most = 1.05 * max(float(distance.max()) for _, distance in curves)
     if kept:
         nearest = min(float(distance.min()) for _, distance in curves)
-        top = max(FAR * max(kept.values()), 1.2 * nearest)
+        top = FAR * max(*kept.values(), nearest)
         most = top if most > FAR / 2 * top else most
     axes.set_ylim(0.0, (most or 1.0) / size)
     axes.set_ylabel(f"distance [{unit}]")

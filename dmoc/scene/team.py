@@ -11,6 +11,7 @@ import numpy as np
 from dmoc.basics.arguments import checked, entries, short
 from dmoc.legs.together import Together
 from dmoc.parts.objectives import Objective
+from dmoc.parts.rows import snake
 from dmoc.scene.problem import TransferProblem
 
 # What a transfer is called that was given no name.
@@ -124,7 +125,8 @@ class Team:
         """What messages call each of `pairs`: its part and its two bodies, and which of alike parts it is."""
         found: list[str] = []
         for part, a, b in self.pairs():
-            name = f"{type(part).__name__.lower()} {self.names[a]} and {self.names[b]}"
+            kind = snake(type(part).__name__).replace("_", " ")
+            name = f"{kind} {self.names[a]} and {self.names[b]}"
             alike = sum(other == name or other.startswith(f"{name}, ") for other in found)
             found.append(name + (f", {alike + 1}" if alike else ""))
         return found

@@ -36,7 +36,7 @@ from dmoc import (
 )
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import load_problem
-from dmoc.teams.climb import first_path
+from dmoc.teams.climb import TeamClimb, first_path
 from dmoc.teams.guess import guessed
 from dmoc.teams.optima import team_optima
 from dmoc.teams.program import TeamProgram
@@ -252,6 +252,20 @@ def test_guesses_are_bent_to_one_side_since_head_on_no_side_is_nearer():
     others = [guessed(team, (uniform_mesh(12), 4, False), sides=sides) for sides in ((1,), (-1,))]
     assert np.array_equal(others[0].legs[0].place, bent.legs[0].place)
     assert others[1].legs[0].place[12] == pytest.approx(-sides[0] * np.array([0, 1]), abs=1e-12)
+
+
+@pytest.mark.parametrize("duration, objective", [(10.0, Effort()), ((5.0, 20.0), Time())])
+def test_where_lines_fail_the_bodies_begin_with_paths_of_their_own(duration, objective):
+    """An attempt that was given up is followed by one from what each body would do by itself."""
+    more = {"duration": duration, "objective": objective, "actuator": BallForce(0.1)}
+    team = Team([replace(one, **more) for one in (ONE, TWO)], [Apart(0.4)])
+    climb = TeamClimb(team, None, None, False, None)
+    path = first_path(team, None, 12, False)
+    with climb.interrupt:
+        failed = climb.attempt(path, most=1)
+        found = climb.from_own_answers(failed, path)
+    assert not failed.solved and found.solved
+    assert found.level.objective == pytest.approx(solve(team, steps=12).objective, rel=1e-6)
 
 
 def test_every_kind_of_guess():
