@@ -146,6 +146,7 @@ def test_the_order_of_the_scheme_across_free_switches(order, steps):
 # What deceives: the wrong answer comes out red, or is not reached.
 
 
+@pytest.mark.slow
 def test_steps_too_long_for_a_coast_past_a_moon_come_out_red():
     """Free durations let a coarse mesh cheat: the coast past the Moon is no path of the motion."""
     problem = gallery("halo_transfer")
