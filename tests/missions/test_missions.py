@@ -277,7 +277,7 @@ def test_a_file_holds_a_mission_to_the_last_bit(tmp_path):
         (one.name, one.value) for one in dmoc.verify(found).checks
     ]
     again = dmoc.solve(hohmann(), guess=back)
-    assert again.success and again.iterations < 6
+    assert again.success and again.iterations < 12
 
 
 @pytest.mark.parametrize("what", ["velocity", "impulse", "time", "mass"])
