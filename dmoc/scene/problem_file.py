@@ -82,8 +82,7 @@ class ProblemFile:
         if not (isinstance(made, TransferProblem) or hasattr(made, "joints") or hasattr(made, "together")):
             wanted = f"{FUNCTION}() must return a dmoc.TransferProblem, a dmoc.Mission or a dmoc.Team"
             raise ValueError(f"{self.path}: {wanted}; it returned {_short(made)}")
-        chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
-        made = replace(made, name=self.name, parameters=chosen)
+        made = replace(made, name=self.name, parameters={p.name: p.default for p in self.parameters} | values)
         return getattr(made, "alone", None) or made
 
     def parameter(self, name: str) -> Parameter:
@@ -96,11 +95,9 @@ class ProblemFile:
 
 
 def folders() -> list[Path]:
-    """Where names are looked for: `./problems`, then those of dmoc: in the package where it was installed, else
-    beside it."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "problems"
-    return [Path("problems"), installed if installed.is_dir() else package.parent / "problems"]
+    """Where names are looked for: `./problems`, then those of dmoc, in the package if installed, else beside it."""
+    installed = Path(__file__).resolve().parents[1] / "problems"
+    return [Path("problems"), installed if installed.is_dir() else installed.parents[1] / "problems"]
 
 
 def catalogue() -> list[tuple[str, str]]:
