@@ -30,7 +30,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
         "final_mass": float(solution.final_mass),
         "order": int(solution.order),
         "steps": int(solution.steps),
-        "nodes": len(solution.position),
+        "nodes": len(solution.time),
         "iterations": int(solution.iterations),
         "build_s": float(solution.build_s),
         "solve_s": float(solution.solve_s),

@@ -13,6 +13,7 @@ from dmoc import (
     Drag,
     Free,
     Meet,
+    Spring,
     State,
     Team,
     TransferProblem,
@@ -145,7 +146,7 @@ def test_bodies_that_do_not_meet_fail(meeting, changes, row):
 
 def test_bodies_that_do_not_last_equally_long_or_too_long_fail(meeting):
     off = with_body(meeting, 1, duration=1.001 * meeting.duration)
-    assert not verify(off)["together"].ok
+    assert verify(off)["together"].note == "worst: common duration" and not verify(off)["together"].ok
     both = with_body(with_body(meeting, 0, duration=5.1), 1, duration=5.1)
     assert not verify(both)["bounds"].ok
 
@@ -163,6 +164,17 @@ def test_multipliers_that_are_not_those_of_the_optimum_fail(passing, meeting):
     member = meeting.members[0]
     held = member.path.multipliers | {COSTATE: 1.01 * member.path.multipliers[COSTATE]}
     assert "optimality" in failing(with_body(meeting, 0, multipliers=held))
+
+
+def test_a_step_on_which_one_body_is_not_stable_fails_and_the_body_is_named():
+    """A stiff spring on steps of h omega = 2.4 at order 2; the other body's is soft."""
+    springs = ((1.0, 0.0), (60.0, 3.0))
+    bodies = [
+        TransferProblem(1.0, at_rest(x, 0), Free(), 5.0, effects=[Spring(stiff, (0, 0))])
+        for stiff, x in springs
+    ]
+    report = verify(solve(Team(bodies, [Meet()]), order=2, steps=16))
+    assert not report["stability"].ok and report["stability"].note.startswith("body 2: h omega = 2.4")
 
 
 def test_a_number_that_is_not_finite_fails(passing):

@@ -300,6 +300,33 @@ def test_bodies_that_leap_through_each_other_between_nodes_are_seen_and_kept_apa
     assert good.success and verify(good)["together"].ok
 
 
+def test_steps_in_which_bodies_leap_through_each_other_are_cut():
+    """Two that cross at a right angle, nearest half way between two nodes that are as far as they may be."""
+    step = 0.05
+    bodies = [
+        TransferProblem(1.0, at_rest(-1, 0), at_rest(1, 0), 10.0),
+        TransferProblem(1.0, at_rest(step, -1), at_rest(step, 1), 10.0),
+    ]
+    team = Team(bodies, [Apart(0.99 * step)])
+    assert not verify(solve(team, order=4, steps=30))["together"].ok
+    found = solve(team)
+    assert found.success and verify(found)["together"].ok and not found.warnings
+
+
+def test_rows_whose_unknowns_are_all_fixed_are_not_asked_for():
+    """At starts and goals that are given no unknown is left, nor where both goals fix one velocity."""
+    team = ring(3)
+    program = TeamProgram.of(team, team.stretches, first_path(team, 4, 6, False))
+    for group in program.rows.groups:
+        low = group.of(program.row_bounds[0])[:, 0]
+        assert list(low[[0, -1]]) == [-np.inf] * 2 and (low[1:-1] == 1.0).all()
+    stopping = meeting([Meet()], goals=(State((None, None), (0, 0)), State((None, None), (0, 0))))
+    program = TeamProgram.of(stopping, stopping.stretches, first_path(stopping, 4, 6, False))
+    assert list(program.row_bounds[0]) == [0.0, 0.0, -np.inf, -np.inf]
+    least = 6 * (GAP * NEAR * FAR) ** 2 / ((NEAR**2 + FAR**2) * SPAN**3)
+    assert solve(stopping, steps=2).objective == pytest.approx(least, rel=1e-13)
+
+
 def test_a_failure_names_the_bodies_and_the_distance_that_would_do():
     failed = solve(ring(2, 0.4, actuator=BallForce(0.07)))
     assert failed.status == "infeasible" and "body 1" in failed.message
@@ -405,6 +432,9 @@ def test_orbits_take_as_many_steps_as_their_revolutions_need():
         )
 
     team = Team([circling(1.0, 0.0), circling(1.3, 1.0)], [Meet()])
-    assert len(first_path(team, None, None, False).mesh) > 31
+    start = first_path(team, None, None, False)
+    assert len(start.mesh) > 31
+    # They meet where the first one coasts, not in the middle of two orbits, which is near the attractor.
+    assert [np.linalg.norm(leg.place[-1]) for leg in start.legs] == pytest.approx([1.0, 1.0])
     found = solve(team)
     assert found.success and all(check.ok for check in verify(found).checks)
