@@ -188,6 +188,9 @@ def test_a_free_duration_may_end_on_its_limit():
 @pytest.mark.parametrize("goals", [(Free(), Free()), (Free(), at_rest(1.0, 1.0))])
 def test_satellites_meet_in_orbit(goals):
     near = [ClohessyWiltshire(0.3)]
+    start = first_path(meeting([Meet()], 20.0, goals, effects=near), None, None, False)
+    aim = [GAP / 2, 0.0] if goals[1] == Free() else [1.0, 1.0]
+    assert all(leg.place[-1] == pytest.approx(aim) for leg in start.legs)
     found = solve(meeting([Meet()], 20.0, goals, effects=near)).raise_for_status()
     report = verify(found)
     assert all(check.ok for check in report.checks) and report["together"].value < 1e-9
@@ -332,6 +335,14 @@ def test_a_failure_names_the_bodies_and_the_distance_that_would_do():
     assert failed.status == "infeasible" and "body 1" in failed.message
     assert "m (you gave 0.4 m) between body 1 and body 2" in failed.message
     assert failed.worst and "body" in failed.worst[0][0]
+
+
+def test_what_a_distance_lacks_is_told_in_metres():
+    team = Team([ONE, TWO], [Apart(0.4)])
+    straight = guessed(team, (uniform_mesh(12), 4, False), bent=False)
+    stopped = solve(team, guess=straight, steps=12, options={"ipopt.max_iter": 0})
+    ((name, lacks, unit),) = [row for row in stopped.worst if row[0] == "apart body 1 and body 2[12].distance"]
+    assert unit == "m" and lacks == pytest.approx(0.4, rel=1e-6)
 
 
 def test_a_solution_is_saved_to_the_last_bit(tmp_path):
