@@ -114,9 +114,17 @@ def too_near(team: Team, path: TeamPath) -> Iterator[tuple[int, int, int, float]
     for i, (part, a, b) in enumerate(team.pairs()):
         if not (distance := part.distance_kept):
             continue
-        gap = np.linalg.norm(path.legs[b].place - path.legs[a].place, axis=1)[1:-1]
-        if gap.min() < distance:
+        if _nearest(path.legs[b].place - path.legs[a].place) < distance:
             yield i, a, b, distance
+
+
+def _nearest(apart: np.ndarray) -> float:
+    """The least distance of the origin from the chords between places, but for the two at the ends [m]."""
+    begin, chord = apart[1:-2], np.diff(apart[1:-1], axis=0)
+    along = -np.sum(begin * chord, axis=1) / np.maximum(np.sum(chord**2, axis=1), np.finfo(float).tiny)
+    foot = begin + np.clip(along, 0.0, 1.0)[:, None] * chord
+    both = np.concatenate([apart[1:-1], foot])
+    return float(np.linalg.norm(both, axis=1).min())
 
 
 def other_sides(team: Team, path: TeamPath) -> Iterator[tuple[int, ...]]:

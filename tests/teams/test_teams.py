@@ -37,6 +37,7 @@ from dmoc import (
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import load_problem
 from dmoc.teams.climb import TeamClimb, first_path
+from dmoc.teams.cuts import leapt
 from dmoc.teams.guess import guessed
 from dmoc.teams.optima import team_optima
 from dmoc.teams.program import TeamProgram
@@ -198,6 +199,16 @@ def test_satellites_meet_in_orbit(goals):
         assert found.members[0].position[-1] == pytest.approx([1.0, 1.0], abs=1e-9)
 
 
+def test_three_meet_in_one_place():
+    """All end at the middle of their starts, weighted by the squares of their masses."""
+    places, masses = np.array([(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]), np.array([1.0, 2.0, 1.5])
+    bodies = [TransferProblem(m, at_rest(*p), Free(), 5.0) for m, p in zip(masses, places, strict=True)]
+    found = solve(Team(bodies, [Meet()]), order=4, steps=2)
+    middle = (masses[:, None] ** 2 * places).sum(axis=0) / (masses**2).sum()
+    assert all(one.position[-1] == pytest.approx(middle, abs=1e-9) for one in found.members)
+    assert verify(found).ok
+
+
 def test_some_of_a_team_meet_while_others_keep_away():
     bodies = [TransferProblem(1.0, at_rest(x, 0), Free(), 5.0) for x in (0.0, 2.0)]
     bodies.append(TransferProblem(1.0, at_rest(1, -1), at_rest(1, 1), 5.0))
@@ -314,6 +325,36 @@ def test_steps_in_which_bodies_leap_through_each_other_are_cut():
     assert not verify(solve(team, order=4, steps=30))["together"].ok
     found = solve(team)
     assert found.success and verify(found)["together"].ok and not found.warnings
+
+
+def test_steps_in_which_a_body_leaps_a_zone_of_its_own_are_cut():
+    zone = KeepOut((0.025, 0.0), 0.024)
+    team = Team([replace(TWO, constraints=[zone]), replace(ONE, start=at_rest(1, 1), goal=at_rest(-1, 1))])
+    assert not verify(solve(team, order=4, steps=30))["bounds"].ok
+    found = solve(team)
+    assert found.success and verify(found).ok
+
+
+def test_where_bodies_leap_head_on_they_are_sought_on_other_sides():
+    """On an odd number of steps of order 2 no node is in the middle, where straight lines meet."""
+    team = Team([ONE, TWO], [Apart(0.1)])
+    climb = TeamClimb(team, None, None, False, None)
+    straight = guessed(team, (uniform_mesh(11), 2, False), bent=False)
+    with climb.interrupt:
+        through = climb.attempt(straight)
+        assert through.solved and len(leapt(team, through.path))
+        found = climb.round_the_other_way(through, straight)
+    assert found.solved and not len(leapt(team, found.path))
+    assert found.level.objective > through.level.objective
+
+
+def test_multipliers_of_a_distance_go_along_to_another_mesh():
+    path = solve(ring(2, 0.4), steps=12).path
+    finer = path.onto([(uniform_mesh(24), 4)])
+    ((name, coarse),) = path.densities.items()
+    sums = [float((values[:, 0] * on.weights).sum()) for values, on in ((coarse, path), (finer.densities[name], finer))]
+    # The weights of nodes differ within a step, so that a peak at one node is kept in its size alone.
+    assert sums[0] < 0 and 0.5 < sums[1] / sums[0] < 2
 
 
 def test_rows_whose_unknowns_are_all_fixed_are_not_asked_for():
