@@ -29,6 +29,9 @@ def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Tr
             "a team of bodies cannot be simulated as a whole; simulate its members, each with its own "
             "solution: dmoc.simulate(team.members[0], solution.members[0])"
         )
+    if hasattr(controls, "legs") and not hasattr(problem, "joints"):
+        # The arcs of a transfer that was solved by its structure are the legs of a mission.
+        problem = controls.attach(problem).require_problem()
     if not hasattr(problem, "joints"):
         return march.simulate(problem, controls, *given, **more)
     return flown_mission(problem, controls)

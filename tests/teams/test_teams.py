@@ -352,7 +352,10 @@ def test_multipliers_of_a_distance_go_along_to_another_mesh():
     path = solve(ring(2, 0.4), steps=12).path
     finer = path.onto([(uniform_mesh(24), 4)])
     ((name, coarse),) = path.densities.items()
-    sums = [float((values[:, 0] * on.weights).sum()) for values, on in ((coarse, path), (finer.densities[name], finer))]
+    sums = [
+        float((values[:, 0] * on.weights).sum())
+        for values, on in ((coarse, path), (finer.densities[name], finer))
+    ]
     # The weights of nodes differ within a step, so that a peak at one node is kept in its size alone.
     assert sums[0] < 0 and 0.5 < sums[1] / sums[0] < 2
 
