@@ -30,7 +30,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
         "final_mass": float(solution.final_mass),
         "order": int(solution.order),
         "steps": int(solution.steps),
-        "nodes": len(solution.time),
+        "nodes": len(solution.position),
         "iterations": int(solution.iterations),
         "build_s": float(solution.build_s),
         "solve_s": float(solution.solve_s),
@@ -86,6 +86,8 @@ def _of_team(solution: Any) -> dict[str, Any]:
     """The bodies, and the least distance of each two of them at the nodes."""
     names = solution.names
     return {
+        # All bodies share them.
+        "nodes": len(solution.time),
         "bodies": [
             {"name": name, "cost": float(one.objective), "final_mass": float(one.final_mass)}
             for name, one in zip(names, solution.members, strict=True)

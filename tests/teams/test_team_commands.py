@@ -82,6 +82,7 @@ def test_the_json_of_a_team_has_its_bodies_and_their_distances(folder, capsys):
     assert sum(body["cost"] for body in found["bodies"]) == pytest.approx(found["objective"], rel=1e-12)
     (pair,) = found["distances"]
     assert pair["between"] == ["red", "green"] and pair["least"] == pytest.approx(0.4) and pair["at"] == 5.0
+    assert found["nodes"] == 2 * found["steps"] + 1
     assert found["checks"]["together"]["ok"] and "legs" not in found
 
 
