@@ -28,6 +28,7 @@ LAYERS = [
     ["solver", "checks"],
     ["missions"],
     ["structure"],
+    ["planners"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
     ["charts", "films"],

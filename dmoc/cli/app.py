@@ -183,6 +183,9 @@ def export(
     steps: Steps = None,
     hold: Hold = False,
     settings: Settings = None,
+    guess: Annotated[
+        Path | None, typer.Option(help="A saved solution for the solver to start from; best for a mission.")
+    ] = None,
     no_c: Annotated[bool, switch("--no-c", help="Leave out the C code.")] = False,
 ) -> None:
     """Write integrator, residual and solver of a problem as CasADi files and C code.
@@ -194,8 +197,9 @@ def export(
     import dmoc
     from dmoc.reports import words as report
 
-    problem = transfer_of(name, settings, "export")
-    paths = dmoc.export(problem, folder, 2 if order is None else order, steps, hold, c=not no_c)
+    _, problem = problem_of(name, settings)
+    start = None if guess is None else dmoc.load(guess)
+    paths = dmoc.export(problem, folder, order, steps, hold, not no_c, start)
     functions = json.loads(paths[0].read_text())["functions"]
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))

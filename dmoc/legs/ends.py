@@ -46,7 +46,8 @@ class Free(Boundary):
 class Periodic(Free):
     """The state of the start once more: the mission may be repeated.
 
-    Where the motion keeps an energy one velocity follows from the others, and is not asked for again.
+    Where the motion keeps an energy, in coasts on which nothing does work, one velocity follows from the
+    others, and is not asked for again.
     """
 
     closes: ClassVar[bool] = True

@@ -43,6 +43,8 @@ class Event(ABC):
 
     # Whether its unknowns are a velocity change, which costs.
     pushes: ClassVar[bool] = False
+    # Whether the energy per mass is the same before and behind it.
+    keeps_energy: ClassVar[bool] = False
 
     def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
         """Name and unit of each unknown of its own, in a space of so many axes."""
@@ -141,6 +143,7 @@ class Drop(Event):
     """
 
     mass: float
+    keeps_energy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checked(self, mass=number("Drop: mass", self.mass, "kg", positive=True))
@@ -170,6 +173,7 @@ class Via(Event):
     """
 
     boundary: Any
+    keeps_energy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         place = entries(self.boundary)

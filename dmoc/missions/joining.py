@@ -20,6 +20,7 @@ from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint, both_ends
 from dmoc.missions.path import MissionPath
 from dmoc.missions.within import Placed
+from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
@@ -33,7 +34,7 @@ ROUNDED = 1e-8
 
 
 class Given:
-    """Symbols for the numbers that change without a rebuild: parameters of the legs, then those of both ends."""
+    """Symbols for the numbers that change without a rebuild: parameters of legs, then of both ends."""
 
     def __init__(self, mission: Mission, legs: Sequence[Placed], count: int):
         self.legs, self.of_legs, self._symbols = legs, ca.SX.sym("p", count), []
@@ -221,9 +222,20 @@ def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
     return layout
 
 
-def row_to_drop(path: MissionPath) -> int:
-    """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
-    return int(np.argmax(np.abs(path.legs[0].start_velocity)))
+def row_to_drop(mission: Mission, legs: Sequence[Placed], path: MissionPath) -> int:
+    """Which velocity is not asked for again at the end of a closed path: the largest at its start, or none, -1.
+
+    Where nothing does work the energy gives one of them, and a row for it would depend on the others.
+    """
+    still = all(event.keeps_energy for joint in mission.joints for event in joint.events)
+    kept = still and all(_keeps_energy(leg.program.dynamics) for leg in legs)
+    return int(np.argmax(np.abs(path.legs[0].start_velocity))) if kept else -1
+
+
+def _keeps_energy(dynamics: Dynamics) -> bool:
+    """Whether a leg has no controls, and no effect that does work or changes with time."""
+    push = ca.SX(dynamics.point(*dynamics.symbols())[2])
+    return not dynamics.controls and not dynamics.depends_on_time and push.is_zero()
 
 
 def spans_of(mission: Mission, legs: int) -> list[tuple[int, int, Any]]:

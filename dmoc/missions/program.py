@@ -85,7 +85,7 @@ class MissionProgram:
             columns += layout.size
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
-        whole, places, expressions = whole_rows(mission, legs, row_to_drop(path), given)
+        whole, places, expressions = whole_rows(mission, legs, row_to_drop(mission, legs, path), given)
         rows = _add(
             rows, WHOLE, whole, max((leg.program.units for leg in legs), key=attrgetter("time")), bounds
         )

@@ -71,7 +71,8 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
     burns = "mass" in columns
     place = columns["mass" if burns else LEG_MASS].start
     scale = program.units.mass
-    least = max(actuator.dry_mass if burns else 0.0, 1e-6 * mission.mass)
+    # The exported solver finds by large numbers how a bound depends on one: this depends on the dry mass alone.
+    least = (actuator.dry_mass if burns else 0.0) or 1e-6 * scale
     lower[place], upper[place] = least / scale, np.inf
     if given:
         lower[place] = upper[place] = mission.mass / scale
