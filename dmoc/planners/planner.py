@@ -180,7 +180,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     both = ca.vertcat(found["x"], found["g"])
     beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
-    outputs["violation"] = largest(beyond, both)
+    outputs["violation"] = most_of(beyond, both)
     guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
     places = " and ".join(scene.names("places"))
     name, words = ("warm_solver", "from a former plan") if warm else ("solver", f"from a guess of the {places}")
@@ -194,7 +194,7 @@ def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX
     path |= planner.scene.parted(velocities_of(planner.scene, path), "speeds")
     residual = residual_of(planner.scene, path)
     largest = {
-        f"largest_{name}": largest(ca.fabs(ca.vec(part)), ca.vec(part)) for name, part in residual.items()
+        f"largest_{name}": most_of(ca.fabs(ca.vec(part)), ca.vec(part)) for name, part in residual.items()
     }
     lam = _by_group(planner, ca.vertcat(found["lam_x"], found["lam_g"]), "multipliers")
     return {
@@ -250,7 +250,7 @@ def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
     return {name.replace("multipliers", prefix, 1): value for name, value in found.items()}
 
 
-def largest(values: ca.MX, finite: ca.MX) -> ca.MX:
+def most_of(values: ca.MX, finite: ca.MX) -> ca.MX:
     """The largest value, at least 0; infinite if `finite` is not, for a maximum in CasADi passes over NaN."""
     return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 

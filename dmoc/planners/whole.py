@@ -12,7 +12,7 @@ from dmoc.nlp.ipopt import make_solver
 from dmoc.nlp.layout import Group
 from dmoc.planners.functions import all_steps, one_step, rows_of
 from dmoc.planners.mission import MissionPlanner, Part, identifier
-from dmoc.planners.planner import largest
+from dmoc.planners.planner import most_of
 from dmoc.planners.terms import Exported, Term, named
 from dmoc.scene.mission import Mission
 
@@ -95,7 +95,7 @@ def solver(planner: MissionPlanner, options: dict[str, Any] | None, warm: bool) 
         **_given_back(parts[1], found["lam_g"]),
         "objective": _objective(planner, found["f"]),
         **rows,
-        "largest_residual": largest(ca.fabs(ca.vertcat(*forces)), ca.vertcat(*forces)),
+        "largest_residual": most_of(ca.fabs(ca.vertcat(*forces)), ca.vertcat(*forces)),
         "violation": _violation((found["x"], lower, upper), (found["g"], low, high)),
     }
     given = numbers | {f"guess_{name}": symbol for name, symbol in (plan | lam).items()}
@@ -211,7 +211,7 @@ def _solver_terms(planner: MissionPlanner) -> dict[str, Term]:
 def _violation(*sides: tuple[ca.MX, ca.MX, ca.MX]) -> ca.MX:
     """How far unknowns and rows are beyond their bounds at most, all scaled."""
     values, low, high = (ca.vertcat(*part) for part in zip(*sides, strict=True))
-    return largest(ca.fmax(low - values, values - high), values)
+    return most_of(ca.fmax(low - values, values - high), values)
 
 
 def _objective(planner: MissionPlanner, scaled: Any) -> Any:
