@@ -29,10 +29,10 @@ from dmoc.cli.options import (
     Steps,
     Version,
     attached,
-    draw_solution,
     ends_at_once,
     fail,
     problem_of,
+    seen,
     show_answer,
     switch,
     transfer_of,
@@ -171,7 +171,26 @@ def plot(
 
         save_sweep(sweep_data.read_sweep(file), target)
     else:
-        draw_solution(file, target, source)
+        from dmoc.plots.page import save_figure
+
+        save_figure(seen(file, source), target)
+    report.console().print(f"wrote {target}")
+
+
+@app.command(epilog="Example: dmoc animate flight.nc --out flight.mp4")
+def animate(
+    file: File,
+    out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .gif if not given.")] = None,
+    frames: Annotated[int, typer.Option(help="Number of frames, 2 to 200; 20 are shown a second.")] = 80,
+    source: Source = None,
+) -> None:
+    """Write a moving picture of a saved solution."""
+    import dmoc
+    from dmoc.reports import words as report
+
+    target = file.with_suffix(".gif") if out is None else out
+    writable(target, moving=True)
+    dmoc.animate(seen(file, source), target, frames)
     report.console().print(f"wrote {target}")
 
 

@@ -25,6 +25,8 @@ class Free(Boundary):
     axes: int = 0
     # Whether the state is that of the start once more.
     closes: ClassVar[bool] = False
+    # The number of axes shapes a solve, and is no number that one may change.
+    counts: ClassVar[tuple[str, ...]] = ("axes",)
 
     def __post_init__(self) -> None:
         whole("Free: axes", self.axes, least=0)

@@ -174,7 +174,8 @@ def _numbers_of_parts(whole: Any, owners: Sequence[str], prefix: str, put: Calla
 def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], Any]) -> Iterator[Number]:
     stated = [field.name for field in fields(part)] if is_dataclass(part) else []
     entries = documented(type(part).__doc__)
-    for field in dict.fromkeys([*stated, *part.adjustable]):
+    counts = getattr(part, "counts", ())
+    for field in [one for one in dict.fromkeys([*stated, *part.adjustable]) if one not in counts]:
         called = CALLED.get(field, field)
         documented_as = field if field in entries else called
         own = getattr(part, "units_of_numbers", {})

@@ -230,8 +230,12 @@ def test_a_mission_is_exported_from_a_solution_in_a_file(planets, capsys):
     assert (planets / "folder" / "solver.casadi").exists() and not (planets / "folder" / "c").exists()
 
 
-def test_a_mission_is_simulated_from_a_file(planets, capsys):
+def test_a_mission_is_simulated_and_filmed_from_a_file(planets, capsys):
     run(capsys, "solve", "planets.py", "--out", "flight.nc")
+    code, said = run(capsys, "animate", "flight.nc", "--frames", "3")
+    assert code == 0 and said.out == "wrote flight.gif\n" and (planets / "flight.gif").stat().st_size > 1000
+    code, said = run(capsys, "animate", "flight.nc", "--frames", "1")
+    assert code == 2 and "frames must be a whole number from 2 to 200" in said.err
     code, said = run(capsys, "simulate", "planets.py", "--controls", "flight.nc")
     assert code == 0 and "final time" in said.out and "11.3 s" in said.out
 
