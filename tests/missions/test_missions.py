@@ -305,6 +305,25 @@ def test_a_file_holds_a_mission_to_the_last_bit(tmp_path):
     assert again.success and again.iterations < 4
 
 
+def test_a_check_of_the_users_own_is_told_of_the_worst_leg():
+    found = dmoc.solve(gates())
+
+    def width(evidence):
+        return dmoc.Check.of("width", float(np.ptp(evidence.position[:, 0])), 1.0 + 1e-9, "m")
+
+    def late(evidence):
+        return dmoc.Check.of("late", evidence.problem.start_time, 0.5, "s")
+
+    report = dmoc.verify(found, more=[width, late])
+    assert report["width"].ok and report["width"].value == pytest.approx(1.0)
+    assert not report["late"].ok and report["late"].note.startswith(found.problem.leg_names[-1])
+    assert not report.ok and dmoc.verify(found).ok
+    with pytest.raises(ValueError, match="'<lambda>' gives must be"):
+        dmoc.verify(found, more=[lambda evidence: True])
+    with pytest.raises(ValueError, match="name that is taken: joints"):
+        dmoc.verify(found, more=[lambda evidence: dmoc.Check.of("joints", 0.0, 1.0, "m")])
+
+
 @pytest.mark.parametrize("what", ["velocity", "impulse", "time", "mass"])
 def test_a_corrupted_joint_fails(what):
     found = dmoc.solve(rocket()) if what == "mass" else dmoc.solve(hohmann() if what == "impulse" else gates())
