@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import new as new_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
 from dmoc.cli import study as study_command
@@ -66,6 +67,9 @@ def list_problems() -> None:
     if not found:
         raise ValueError(f"no problem files in {' or '.join(map(str, library.folders()))}")
     report.console().print(report.pairs(found))
+
+
+app.command(epilog="Example: dmoc new my_flight --from orbit_raise")(new_command.new)
 
 
 @app.command(epilog="Example: dmoc show free_flyer")

@@ -96,8 +96,11 @@ class ProblemFile:
 
 
 def folders() -> list[Path]:
-    """Where names are looked for: `./problems`, then `problems` beside the package."""
-    return [Path("problems"), Path(__file__).resolve().parents[2] / "problems"]
+    """Where names are looked for: `./problems`, then those of dmoc: in the package where it was installed, else
+    beside it."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "problems"
+    return [Path("problems"), installed if installed.is_dir() else package.parent / "problems"]
 
 
 def catalogue() -> list[tuple[str, str]]:

@@ -410,6 +410,7 @@ def test_help_and_list_do_not_load_the_libraries(arguments):
     "verb",
     [
         "list",
+        "new",
         "show",
         "solve",
         "effects",

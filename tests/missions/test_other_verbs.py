@@ -179,6 +179,7 @@ def test_other_impulses_are_flown_as_they_are_given():
     assert flown.velocity[-1] == pytest.approx(flown.velocity[-2])
 
 
+@pytest.mark.slow
 def test_several_starts_find_the_other_optima_of_a_mission():
     found = mission_optima(hohmann(), 6)
     assert found[0].objective == pytest.approx(0.284457, rel=1e-4)

@@ -141,6 +141,7 @@ def test_drone_hop_meets_indirect_shooting():
     assert solution.position[:, 2].min() > -1e-9
 
 
+@pytest.mark.slow
 def test_halo_transfer_is_the_same_on_fine_meshes_and_no_worse_than_twenty_segments():
     halo = make("halo_transfer")
     default, fine = solve(halo), solve(halo, order=8, steps=100)
