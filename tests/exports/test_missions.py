@@ -19,10 +19,13 @@ from dmoc import (
     Mission,
     Moving,
     PointGravity,
+    Pose,
     State,
     UniformGravity,
     Via,
+    Wrench,
     export,
+    rotation,
     solve,
 )
 from dmoc.planners.mission import MissionPlanner, identifiers
@@ -240,3 +243,20 @@ def test_legs_whose_names_cannot_be_names_are_numbered():
         "leg_5",
         "coast_4",
     )
+
+
+def test_a_leg_of_a_body_that_turns_rolls_out_with_its_attitude():
+    ends = Pose((0, 0, 0)), Pose((2, 1, 0), attitude=rotation((0, 1, 1), degrees=100))
+    legs = [Leg(2.4), Leg((2.0, 4.0))]
+    turning = Mission(10.0, *ends, legs, actuator=Wrench(5.0, 5.0), inertia=(1.0, 2.0, 2.5), duration=6.0)
+    found = solve(turning, order=4, steps=6)
+    planner = MissionPlanner.of(turning, None, None, False, found)
+    functions = {one.function.name(): one.function for one in mission_functions(planner)}
+    plan = functions["warm_solver"](**functions["nominal"]())
+    assert float(plan["objective"]) == pytest.approx(found.objective, rel=1e-12)
+    assert float(plan["largest_residual"]) < 1e-9 and plan["leg_2_dynamics_attitude"].shape == (4, 13)
+    leg, velocity = found.legs[1], found.legs[1].path.start_velocity
+    state = {"position": leg.position[0], "attitude": leg.attitude[0], "mass": 10.0}
+    state |= {"velocity": velocity[:3], "rate": velocity[3:], "forces": leg.path.control.T}
+    flown = functions["rollout_leg_2"](**state, start_time=leg.time[0], duration=leg.duration)
+    np.testing.assert_allclose(np.array(flown["attitudes"]).T, leg.attitude, atol=1e-10)

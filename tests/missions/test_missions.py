@@ -28,10 +28,13 @@ from dmoc import (
     Mission,
     Periodic,
     PointGravity,
+    Pose,
     State,
     TransferProblem,
     UniformGravity,
     Via,
+    Wrench,
+    rotation,
     three_body,
 )
 from dmoc.missions.program import MissionProgram
@@ -221,6 +224,31 @@ def test_a_closed_path_around_a_lagrange_point():
     assert path.position[-1] == pytest.approx(path.position[0], abs=1e-9)
     # The velocity that is not asked for again follows from Jacobi's integral, to the error of the scheme.
     assert path.velocity[-1] == pytest.approx(path.velocity[0], abs=1e-6)
+
+
+def tumbling(legs):
+    """A body that moves and turns from rest to rest by force and torque."""
+    ends = Pose((0, 0, 0)), Pose((2, 1, 0), attitude=rotation((0, 1, 1), degrees=100))
+    return Mission(10.0, *ends, legs, actuator=Wrench(5.0, 5.0), inertia=(1.0, 2.0, 2.5))
+
+
+def test_a_body_that_turns_flies_two_legs_as_it_flies_one():
+    whole = tumbling([Leg(6.0)]).alone
+    one = dmoc.solve(whole, order=4, mesh=[0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.0])
+    two = dmoc.solve(tumbling([Leg(2.4), Leg(3.6)]), order=4, steps=4)
+    assert two.success and dmoc.verify(two).ok
+    assert two.objective == pytest.approx(one.objective, rel=1e-9)
+    meeting = two.legs[0].position[-1], two.legs[1].position[0]
+    assert meeting[0] == pytest.approx(meeting[1], abs=1e-9)
+    assert abs(float(two.legs[0].attitude[-1] @ two.legs[1].attitude[0])) == pytest.approx(1.0)
+
+
+def test_a_body_that_turns_goes_by_way_of_a_pose():
+    middle = Pose((1, 1, 0.5), attitude=rotation((1, 0, 0), degrees=60), velocity=None, rate=None)
+    found = dmoc.solve(tumbling([Leg((1.0, 5.0)), Via(middle), Leg((1.0, 5.0))]), order=4, steps=8)
+    assert found.success and dmoc.verify(found).ok
+    assert found.legs[1].position[0] == pytest.approx([1, 1, 0.5], abs=1e-8)
+    assert abs(float(found.legs[1].attitude[0] @ middle.fixed()[0][3:])) == pytest.approx(1.0)
 
 
 def test_a_path_that_is_driven_closes_with_all_its_velocities():
