@@ -170,12 +170,15 @@ def test_rows_of_a_joint_show_what_is_disturbed_there():
     assert np.abs(np.array(off["goal_rows"])).max() == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_a_force_that_is_missing_shows_as_itself():
-    given, residual = planned(gates), made(gates)[2]["residual"]
-    more = np.zeros(given["home_forces"].shape)
+@pytest.mark.parametrize(("make", "name"), [(gates, "home"), (rocket, "lower_stage")])
+def test_a_force_that_is_missing_shows_as_itself(make, name):
+    """In newtons, in a leg of a free duration and in one of a fixed one that loses mass."""
+    given, residual = planned(make), made(make)[2]["residual"]
+    more = np.zeros(given[f"{name}_forces"].shape)
     more[1] = 0.25
-    off = np.array(residual(**given | {"home_forces": given["home_forces"] + more})["home_dynamics"])
-    np.testing.assert_allclose(off, more, atol=1e-8)
+    changed = {f"{name}_forces": given[f"{name}_forces"] + more}
+    off = np.array(residual(**given | changed)[f"{name}_dynamics"])
+    np.testing.assert_allclose(off, more[:2], atol=1e-8)
 
 
 @pytest.mark.parametrize("make", [rocket, comet])

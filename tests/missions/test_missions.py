@@ -37,7 +37,9 @@ from dmoc import (
     rotation,
     three_body,
 )
+from dmoc.missions.guess import guessed
 from dmoc.missions.program import MissionProgram
+from dmoc.motion.mesh import uniform_mesh
 
 # Velocity changes of Hohmann's transfer from radius 1 to radius 2 with mu = 1, and its duration.
 HOHMANN = 0.2844570503761732
@@ -241,6 +243,15 @@ def test_a_body_that_turns_flies_two_legs_as_it_flies_one():
     meeting = two.legs[0].position[-1], two.legs[1].position[0]
     assert meeting[0] == pytest.approx(meeting[1], abs=1e-9)
     assert abs(float(two.legs[0].attitude[-1] @ two.legs[1].attitude[0])) == pytest.approx(1.0)
+
+
+def test_a_guess_of_a_body_that_turns_has_the_rates_of_its_attitudes():
+    path = guessed(tumbling([Leg(2.4), Leg(3.6)]), [(uniform_mesh(40), 2)] * 2)
+    leg = path.legs[1]
+    (attitudes,), step = leg.attitudes, leg.duration / 40
+    angle = 2 * np.arccos(abs(float(attitudes[0] @ attitudes[1])))
+    assert np.linalg.norm(leg.start_velocity[3:]) == pytest.approx(angle / step, rel=1e-2) and angle > 0.01
+    assert np.linalg.norm(attitudes, axis=1) == pytest.approx(1.0)
 
 
 def test_a_body_that_turns_goes_by_way_of_a_pose():
