@@ -31,6 +31,7 @@ from dmoc.planners.whole import coded, mission_functions
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import DEFAULT_STEPS
+from dmoc.solver.solve import check_numerics
 
 # The remedy that is told where a folder holds what an export must not take the place of.
 MOVE = "name a new folder, or move what is there"
@@ -150,6 +151,8 @@ def _of_transfer(problem: Any, numerics: tuple, options: dict[str, Any] | None, 
 
 
 def _of_mission(problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool) -> _Contents:
+    order, steps, hold, _ = numerics
+    check_numerics(order, steps, None, hold, options, None, None)
     planner = MissionPlanner.of(problem, *numerics)
     functions, write = mission_functions(planner, options), partial(write_mission_code, planner)
     return _Contents(functions, coded(planner), about_mission(planner), mission_readme(planner, c), write)

@@ -62,8 +62,8 @@ class MissionPlanner:
         count = len(getattr(getattr(guess, "path", guess), "legs", mission.plan))
         if count != len(mission.plan):
             raise ValueError(
-                f"mission {mission.name!r} has {len(mission.plan)} legs, its guess {count}; export the mission "
-                "that the guess solves, which is solution.problem where legs were made by a solve"
+                f"mission {mission.name!r} has {len(mission.plan)} and its guess {count} legs; export the "
+                "mission that the guess solves, which is solution.problem where legs were made by a solve"
             )
         path = first_path(mission, order, steps, hold, guess)
         scenes = tuple(

@@ -231,9 +231,21 @@ def test_files_and_c_code_of_a_mission_are_its_functions(tmp_path):
             np.testing.assert_allclose(np.array(one), np.array(other), rtol=1e-9, atol=1e-9)
 
 
-def test_a_guess_of_other_legs_is_refused_in_one_line(tmp_path):
-    with pytest.raises(ValueError, match="has 1 legs, its guess 2") as told:
-        export(comet(), tmp_path / "out", guess=made(rocket)[0])
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"order": 3}, "order must be one of 2, 4, 6, 8"),
+        ({"steps": 1}, "steps must be a whole number of at least 2"),
+        ({"options": 3}, "options must be a dict"),
+        ({"guess": "path"}, "guess must be a function of the time"),
+        ({"guess": rocket}, "has 1 and its guess 2 legs; export the mission that the guess solves"),
+    ],
+)
+def test_what_has_no_meaning_is_refused_in_one_line(given, words, tmp_path):
+    if "guess" in given and callable(given["guess"]):
+        given = {"guess": made(rocket)[0]}
+    with pytest.raises(ValueError, match=words) as told:
+        export(comet(), tmp_path / "out", **given)
     assert "\n" not in str(told.value) and not (tmp_path / "out").exists()
 
 
