@@ -8,6 +8,8 @@ ceiling; with `--structure` its three arcs become legs, and the answer is right 
 A. E. Bryson, W. F. Denham, S. E. Dreyfus, AIAA Journal 1 (1963) 2544.
 """
 
+from math import inf
+
 from dmoc import KeepIn, State, TransferProblem
 
 
@@ -26,5 +28,5 @@ def problem(ceiling: float = 1 / 9, duration: float = 1.0):
         start=State((0,), (1,)),
         goal=State((0,), (-1,)),
         duration=duration,
-        constraints=[KeepIn((-1,), (ceiling,))],
+        constraints=[KeepIn((-inf,), (ceiling,))],
     )

@@ -76,7 +76,12 @@ Steps = Annotated[
 ]
 Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
 Structure = Annotated[
-    bool, switch("--structure", help="Make burns, coasts and touches of a coarse answer legs with free ends.")
+    bool | None,
+    switch(
+        "--structure/--no-structure",
+        help="Make burns, coasts and touches of a coarse answer legs with free ends; where --tol is below 1e-5 "
+        "it is tried.",
+    ),
 ]
 Impulses = Annotated[
     str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")

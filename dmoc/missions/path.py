@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import casadi as ca
 import numpy as np
@@ -42,6 +43,13 @@ class MissionPath:
     forces: dict[str, np.ndarray] = field(default_factory=dict)
     near: bool = False
     idle: tuple[str, ...] = ()
+
+    def as_one(self, controls: int) -> DiscretePath:
+        """The path of all legs as that of a transfer with so many controls, without multipliers."""
+        order = max(leg.order for leg in self.legs)
+        parts = [leg.onto(leg.mesh, order, False) for leg in self.legs]
+        parts = [part if part.control.shape[1] == controls else coasting(part, controls) for part in parts]
+        return reduce(merged, parts)
 
     def without_idle(self, mission: Mission, nothing: float) -> MissionPath:
         """The same with impulses below a speed [m/s] as none, but for the last one."""
@@ -142,6 +150,27 @@ def joint_cost(mission: Mission, path: MissionPath) -> float:
     state = last.place[-1], last.goal_velocity[last.coordinates.speeds], last.mass[-1]
     end = mission.objective.terminal(ca.DM(path.begins[-1] + last.duration), *map(ca.DM, state))
     return total + DECIDED * abs(float(end))
+
+
+def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
+    """Two paths of one order, one after the other, as one without multipliers."""
+    total = first.duration + last.duration
+    share = first.duration / total
+    return replace(
+        first,
+        mesh=np.concatenate([share * first.mesh, share + (1 - share) * last.mesh[1:]]),
+        duration=total,
+        position=np.concatenate([first.position, last.position[1:]]),
+        control=np.concatenate([first.control, last.control[0 if first.hold else 1 :]]),
+        mass=np.concatenate([first.mass, last.mass[1:]]),
+        goal_velocity=last.goal_velocity,
+        multipliers={},
+    )
+
+
+def coasting(path: DiscretePath, controls: int) -> DiscretePath:
+    """A path with so many controls, none of which pushes."""
+    return replace(path, control=np.zeros((len(path.control), controls)))
 
 
 def cold(path: MissionPath) -> MissionPath:

@@ -94,7 +94,7 @@ class ProblemFile:
 
 
 def folders() -> list[Path]:
-    """Where names are looked for: `./problems`, then inside the package as installed, or beside it as checked out."""
+    """Where names are looked for: `./problems`, then inside the package, or beside it in a checkout."""
     package = Path(__file__).resolve().parents[1]
     inside = package / "problems"
     return [Path("problems"), inside if inside.is_dir() else package.parent / "problems"]

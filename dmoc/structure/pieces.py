@@ -1,4 +1,4 @@
-"""A path in two parts, and two parts as one path."""
+"""A path in two parts."""
 
 from __future__ import annotations
 
@@ -44,19 +44,3 @@ def cut(path: DiscretePath, fraction: float) -> tuple[DiscretePath, DiscretePath
         multipliers={},
     )
     return first, last
-
-
-def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
-    """Two paths of one order, one after the other, as one without multipliers."""
-    total = first.duration + last.duration
-    share = first.duration / total
-    return replace(
-        first,
-        mesh=np.concatenate([share * first.mesh, share + (1 - share) * last.mesh[1:]]),
-        duration=total,
-        position=np.concatenate([first.position, last.position[1:]]),
-        control=np.concatenate([first.control, last.control[0 if first.hold else 1 :]]),
-        mass=np.concatenate([first.mass, last.mass[1:]]),
-        goal_velocity=last.goal_velocity,
-        multipliers={},
-    )

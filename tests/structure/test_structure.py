@@ -219,11 +219,52 @@ def test_a_file_holds_the_structure(tmp_path):
     ]
 
 
+def test_the_structure_of_a_transfer_is_a_guess_and_gives_its_controls():
+    problem = gallery("two_body_fuel")
+    found = dmoc.solve(problem, tol=1e-6)
+    again = dmoc.solve(problem, order=4, steps=60, guess=found)
+    assert again.success and again.objective == pytest.approx(found.objective, rel=2e-3)
+    flight = dmoc.simulate(problem, found)
+    assert flight.position[-1] == pytest.approx(found.position[-1], abs=1e-6)
+    assert flight.mass[-1] == pytest.approx(1.0 - found.objective, abs=1e-9)
+
+
 def test_an_answer_of_one_arc_is_that_of_the_ordinary_ladder():
     problem = gallery("point_to_point")
     assert solve_by_structure(problem) is None
     one, other = dmoc.solve(problem), dmoc.solve(problem, structure=True)
     assert one.objective == other.objective and one.ladder[-1].steps == other.ladder[-1].steps
+
+
+@pytest.mark.parametrize(
+    ("numerics", "legs"),
+    [
+        ({"tol": 1e-7}, True),
+        ({"tol": 1e-4}, False),
+        ({"tol": 1e-7, "structure": False, "time_limit": 0.5}, False),
+        ({"tol": 1e-7, "order": 4, "time_limit": 0.5}, False),
+        ({}, False),
+    ],
+)
+def test_a_tight_tolerance_takes_structure_by_itself(numerics, legs):
+    problem = TransferProblem(
+        1.0,
+        State((0, 0), (0, 0)),
+        State((1, 0), (0, 0)),
+        4.0,
+        actuator=Engine(1.0, exhaust_velocity=5.0),
+        objective=Fuel(),
+    )
+    found = dmoc.solve(problem, **numerics)
+    assert hasattr(found, "legs") == legs
+    if legs:
+        assert [arc.kind for arc in from_plain(found.arcs)] == [BURN, COAST, BURN]
+        assert found.success and dmoc.verify(found).ok and found.tolerance == 1e-7
+
+
+def test_without_switches_a_tight_tolerance_is_the_ladder():
+    problem = TransferProblem(1.0, State((0,), (0,)), State((1,), (0,)), 1.0)
+    assert not hasattr(dmoc.solve(problem, tol=1e-8), "legs")
 
 
 def test_what_structure_does_not_take_is_refused():
