@@ -29,6 +29,7 @@ LAYERS = [
     ["missions"],
     ["teams"],
     ["structure"],
+    ["planners"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
     ["charts", "films"],

@@ -187,19 +187,18 @@ def _named(name: str, source_hash: str) -> str | None:
     return name if name.isidentifier() and has_problem(name) else None
 
 
-def draw_solution(file: Path, target: Path, source: str | None) -> None:
-    """Draw a saved solution; without its problem, what the file itself has."""
+def seen(file: Path, source: str | None) -> Any:
+    """A saved solution to draw; without its problem, what the file itself has."""
     import dmoc
-    from dmoc.plots.page import save_figure
 
     try:
-        solution = attached(file, source)
+        return attached(file, source)
     except ValueError as error:
         solution = dmoc.load(file)
         if source is not None:
             raise
         warn(f"zones and limits are left out: {error}")
-    save_figure(solution, target)
+        return solution
 
 
 def show_answer(

@@ -65,6 +65,9 @@ class Attempt:
 class Climb:
     """The attempts at one mission, in their order."""
 
+    # What sees it as Ipopt does.
+    program: Any = MissionProgram
+
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
         self.compiled = compiled
@@ -90,7 +93,7 @@ class Climb:
         """
         begun, mission = time.perf_counter(), self.mission
         problems = [_rounded(problem, rounding) for problem in mission.stretches]
-        program = self.program_of(problems, path, rounding)
+        program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
         if near is not None:
@@ -112,10 +115,6 @@ class Climb:
         made = Attempt(program, answer, level)
         self.held = made if made.solved and rounding is None else self.held
         return made
-
-    def program_of(self, problems: list, path: MissionPath, rounding: float | None) -> MissionProgram:
-        """The program of the mission whose legs are these problems."""
-        return MissionProgram.of(self.mission, problems, path, rounding)
 
     def _watch(self, program: MissionProgram) -> Watch:
         def tell(iteration: int, objective: float, x: np.ndarray, g: np.ndarray) -> bool:
@@ -146,11 +145,6 @@ class Climb:
         near, self.reason = mission_cause(failed.program, starts, self.levels.append, self.interrupt)
         return failed if near is None else self._staged(near, self._stages())
 
-    @property
-    def impulses(self) -> int:
-        """The number of impulses."""
-        return sum(event.pushes for joint in self.mission.joints for event in joint.events)
-
     def _staged(self, path: MissionPath, stages: list[float | None]) -> Attempt:
         for i, width in enumerate(stages):
             tried = self.attempt(path, width, MOST_TRYING, carried=i > 0)
@@ -170,7 +164,8 @@ class Climb:
             for one in engines
             if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
         ]
-        if self.impulses > 2:
+        joints = getattr(self.mission, "joints", ())
+        if sum(event.pushes for joint in joints for event in joint.events) > 2:
             # One of several impulses may be none at the optimum.
             own.append(LEAST_WIDTH)
         if not own:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmoc.plots.lanes import LEG_LINES
+from dmoc.plots.mission import scenery
 from dmoc.plots.path import extent_of, frame, legend, lies_wide, mark_burns, pushes, scale_of, scaled_arrows
 from dmoc.plots.sheet import arrange, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import DARK, LIMIT, PALE, flown_force, readable, speeds, within_steps
 from dmoc.plots.surroundings import draw_scene, view_of
-from dmoc.scene.attraction import Attraction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,7 @@ def team_page(solution: TeamSolution, report: Report | None = None) -> Figure:
     """A matplotlib Figure of a team, whose settings are those of the caller."""
     page = new_page(solution.dimension)
     lanes = (_draw_forces, _draw_speeds, _draw_distances)
-    around = _around(solution)
+    around: Any = scenery(solution)  # type: ignore[arg-type]
     view = view_of(around, solution.position) if solution.dimension > 1 else None
     wide = view is not None and lies_wide(view)
     path, panels = new_panels(page, solution.dimension, wide, len(lanes))
@@ -59,28 +58,6 @@ def styles(names: Sequence[str]) -> list[dict[str, Any]]:
     for i in range(len(names)):
         turn, place = divmod(i, len(BODY_COLOURS))
         found.append({"color": BODY_COLOURS[place], "linestyle": LEG_LINES[turn % len(LEG_LINES)]})
-    return found
-
-
-def _around(solution: TeamSolution) -> Any:
-    """What lies around the paths: the effects and constraints of all bodies, each once, as of one transfer."""
-    around: Any = None
-    if solution.problem is not None:
-        members = solution.problem.members
-        effects, constraints = (
-            _once(part for one in members for part in getattr(one, kind)) for kind in ("effects", "constraints")
-        )
-        around = SimpleNamespace(
-            effects=effects, constraints=constraints, attraction=Attraction.of(effects, solution.dimension)
-        )
-    return SimpleNamespace(problem=around, dimension=solution.dimension, position=solution.position)
-
-
-def _once(parts: Any) -> list[Any]:
-    found: list[Any] = []
-    for part in parts:
-        if part not in found:
-            found.append(part)
     return found
 
 

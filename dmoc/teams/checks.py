@@ -12,7 +12,7 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.limits import Excess
-from dmoc.checks.verification import CHECKS, Check, Report
+from dmoc.checks.verification import CHECKS, Check, Report, not_finite, own_checks, refuse_twins
 from dmoc.missions.checks import LEAST, Whole, fastest, worst_of
 from dmoc.results.between import BOUND
 from dmoc.teams.cuts import team_cuts
@@ -25,10 +25,10 @@ def verify_team(solution: TeamSolution, problem: Any = None, more: Sequence = ()
 
     Every body is checked as a transfer between its two ends, and the worst one is told; `together` is what two
     bodies keep, at the nodes, between them and at the end, and that all last equally long; `optimality` are the
-    first-order conditions of the whole team.
+    first-order conditions of the whole team. Each of `more`, which takes the `Evidence` of a body, is told of
+    the worst body, too.
     """
-    if more:
-        raise ValueError("a team takes no checks of your own yet; verify(solution.members[k], more=...) does")
+    own = own_checks(more)
     solution = solution if problem is None else solution.attach(problem)
     begun, team = time.perf_counter(), solution.require_problem()
     with np.errstate(all="ignore"):
@@ -36,7 +36,7 @@ def verify_team(solution: TeamSolution, problem: Any = None, more: Sequence = ()
         bodies = [Evidence(replace(one, tolerance=solution.tolerance), least) for one in solution.members]
         undefined = next((found for one in bodies if (found := one.undefined())), "")
         if undefined:
-            return Report((Check("bodies", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
+            return Report((not_finite("bodies", undefined),), 0.0)
         checks = []
         for name, check in CHECKS.items():
             # Only bodies that turn have a constraint.
@@ -48,6 +48,8 @@ def verify_team(solution: TeamSolution, problem: Any = None, more: Sequence = ()
         path = solution.path
         whole = Whole(solution, TeamProgram.of(team, team.stretches, path), path)
         checks.append(whole.optimality())
+        checks += [worst_of(solution.names, bodies, check) for _, check in own]
+    refuse_twins(checks)
     return Report(tuple(checks), time.perf_counter() - begun)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.guess import mesh_around
-from dmoc.missions.path import MissionPath, cold
+from dmoc.missions.path import cold
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
 from dmoc.parts.objectives import Effort
@@ -41,12 +41,7 @@ SHARPENED = 3
 class TeamClimb(Climb):
     """The attempts at one team, in their order."""
 
-    def program_of(self, problems: list, path: MissionPath, rounding: float | None) -> TeamProgram:
-        return TeamProgram.of(self.mission, problems, path, rounding)
-
-    @property
-    def impulses(self) -> int:
-        return 0
+    program: Any = TeamProgram
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """As of a mission; where two bodies touch, the objective nears its limit by leaps.

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.missions.joining import Placed, leg_program
 from dmoc.missions.path import MissionPath
 from dmoc.missions.program import MissionProgram
+from dmoc.missions.within import Placed, leg_program
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.units import units_of
@@ -61,6 +61,10 @@ class TeamProgram(MissionProgram):
         """The order and the steps, which all bodies share."""
         program = self.legs[0].program
         return program.scheme.order, len(program.mesh) - 1
+
+    def parameters(self) -> np.ndarray:
+        """The parameters of all bodies [SI]."""
+        return np.concatenate([leg.program.parameters(leg.program.problem) for leg in self.legs])
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""

@@ -417,6 +417,7 @@ def test_help_and_list_do_not_load_the_libraries(arguments):
         "simulate",
         "check",
         "plot",
+        "animate",
         "export",
         "stability",
         "study",

@@ -10,6 +10,7 @@ import pytest
 from dmoc import (
     Apart,
     BallForce,
+    Check,
     Drag,
     Free,
     Meet,
@@ -175,6 +176,15 @@ def test_a_step_on_which_one_body_is_not_stable_fails_and_the_body_is_named():
     ]
     report = verify(solve(Team(bodies, [Meet()]), order=2, steps=16))
     assert not report["stability"].ok and report["stability"].note.startswith("body 2: h omega = 2.4")
+
+
+def test_a_check_of_one_s_own_is_told_of_the_worst_body(passing):
+    def speed(evidence):
+        name = evidence.solution.provenance.problem_name
+        return Check.of("fast", 2.0 if name == "west" else 1.0, 9.0, "m/s")
+
+    report = verify(passing, more=[speed])
+    assert report["fast"].ok and report["fast"].note == "west" and report.checks[-1].name == "fast"
 
 
 def test_a_number_that_is_not_finite_fails(passing):

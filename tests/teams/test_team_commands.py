@@ -102,7 +102,7 @@ def test_a_failure_names_bodies_and_distance(folder, capsys):
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (("export", "swap.py", "planner"), "is a team of bodies"),
+        (("export", "swap.py", "planner"), "a team of bodies is not exported"),
         (("effects", "swap.py"), "is a team of bodies"),
         (("study", "swap.py"), "is a team of bodies"),
         (("simulate", "swap.py"), "cannot be simulated as a whole"),

@@ -12,6 +12,7 @@ from dmoc import (
     Apart,
     Attitude,
     BallForce,
+    Check,
     ClohessyWiltshire,
     Effort,
     Engine,
@@ -386,7 +387,7 @@ def test_what_a_distance_lacks_is_told_in_metres():
     team = Team([ONE, TWO], [Apart(0.4)])
     straight = guessed(team, (uniform_mesh(12), 4, False), bent=False)
     stopped = solve(team, guess=straight, steps=12, options={"ipopt.max_iter": 0})
-    ((name, lacks, unit),) = [row for row in stopped.worst if row[0] == "apart body 1 and body 2[12].distance"]
+    ((lacks, unit),) = [row[1:] for row in stopped.worst if row[0] == "apart body 1 and body 2[12].distance"]
     assert unit == "m" and lacks == pytest.approx(0.4, rel=1e-6)
 
 
@@ -425,6 +426,12 @@ SPUN = TransferProblem(
     inertia=(1, 1, 1),
     actuator=Torque(),
 )
+
+
+def twin(evidence):
+    return Check.of("together", 0.0, 1.0, "-")
+
+
 REFUSED = {
     "two or more transfers": lambda: Team([ONE]),
     r"members\[1\] must be a dmoc.TransferProblem": lambda: Team([ONE, 3]),
@@ -453,8 +460,8 @@ REFUSED = {
     ),
     "structure and impulses": lambda: solve(Team([ONE, TWO]), structure=True),
     "cannot be simulated as a whole": lambda: dmoc.simulate(Team([ONE, TWO])),
-    "must be a dmoc.TransferProblem; got Team": lambda: dmoc.export(Team([ONE, TWO]), "nowhere"),
-    "no checks of your own yet": lambda: verify(solve(Team([ONE, TWO]), steps=2), more=[print]),
+    "a team of bodies is not exported": lambda: dmoc.export(Team([ONE, TWO]), "nowhere"),
+    "a check of a name that is taken": lambda: verify(solve(Team([ONE, TWO]), steps=2), more=[twin]),
     "no moving picture": lambda: dmoc.animate(solve(Team([ONE, TWO]), steps=2), "film.gif"),
     "no body is called 'x'; there": lambda: solve(Team([ONE, TWO]), steps=2).of("x"),
 }
