@@ -125,7 +125,7 @@ def test_the_front_loads_nothing_heavy():
 
 
 TEAMS = ["dmoc.scene.team", "dmoc.legs.together", "dmoc.teams.program", "dmoc.teams.solution"]
-HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
+HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py", "pydantic"]
 
 
 @pytest.mark.parametrize(
