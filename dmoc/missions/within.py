@@ -41,7 +41,7 @@ class Placed:
 def leg_program(
     problem: TransferProblem, path: DiscretePath, units: Units, joined: bool = True
 ) -> tuple[Program, list, int]:
-    """A leg without sparse derivatives, its blocks, how many parameters; where it begins is open if `joined`."""
+    """A leg without sparse derivatives, its blocks, parameters; where it begins is open if `joined`."""
     rule = scheme(path.order)
     stencils = stencils_of(problem, path.order, path.hold, joined=joined)
     placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=joined)
