@@ -14,8 +14,8 @@ from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import find, load_problem
 from dmoc.solver.meshes import coarse_to_fine, first_path
+from dmoc.solver.rung import in_tube
 from dmoc.solver.starts import local_optima
-from dmoc.solver.tube import in_tube
 
 GEO = runpy.run_path(str(find("geo_raise")))
 PLANE = math.radians(28.5)
