@@ -26,11 +26,11 @@ from dmoc.solver.revolutions import Sounding, promise, solved_from
 from dmoc.solver.rung import Rung
 
 # In a fixed time another number of revolutions may be better if a path takes more than this many times the
-# least effort of a change of its orbit without a phase [-]: of 60 random transfers all nine that cost more than
-# half as much again as the best one known did (2.2 times or more), and 13 others.
-FOR_A_PHASE = 1.5
-# It may also be if so many iterations without a limit of the force led to a path: others take 2 to 40.
-WANDERED = 60
+# least effort of a change of its orbit without a phase [-]: of 60 random transfers the ten that cost more than
+# a third more than the best one known did (2.2 times or more), and 13 others.
+FOR_A_PHASE = 2.0
+# It may also be if so many iterations without limits led to a path: others take 2 to 40.
+WANDERED = 40
 # Paths of other revolutions are looked for at these orders: from the same guess one mesh leads to a path that
 # another one misses.
 OTHER_ORDERS = (4, 6)

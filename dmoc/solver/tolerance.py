@@ -21,7 +21,7 @@ from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import OFF_OPTIMUM, Rung, let_go
+from dmoc.solver.rung import OFF_OPTIMUM, Rung, at_rest
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
@@ -133,6 +133,8 @@ class _Refinement:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
+            if not self.changes and rung.pull > OFF_OPTIMUM:
+                rung = at_rest(self.ladder.try_on, rung, self.lean)
             fine = rung.path
             self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
             self._hold_if_flat(rung)
@@ -204,9 +206,7 @@ class _Refinement:
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        found = let_go(self.ladder.try_on, rung, self.lean)
-        # Another optimum that costs a hundredth more is no better answer.
-        if found is None or found.stopped or found.cost - rung.cost > 0.01 * abs(rung.cost):
+        if (found := at_rest(self.ladder.try_on, rung, self.lean)) is rung:
             return rung
         before, after = ((one.path, one.level.objective) for one in (rung, found))
         moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))
