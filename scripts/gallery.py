@@ -4,6 +4,7 @@
     ./scripts/run python scripts/gallery.py goddard           # some; the pictures of the others stay
     ./scripts/run python scripts/gallery.py stability         # the long runs of `dmoc stability`, two minutes
     ./scripts/run python scripts/gallery.py sweep             # the map of times and angles, one minute
+    ./scripts/run python scripts/gallery.py porkchop          # the map of launch windows, two minutes
 
 Pictures go to problems/gallery. The exit code is 1 if a problem is not solved or fails a check.
 """
@@ -33,10 +34,14 @@ DPI = 90
 LARGEST = 250_000
 # The argument that stands for the long runs, and the name of their picture.
 LONG_RUNS = "stability"
-# The argument that stands for the sweep, and the name of its picture.
-SWEEP = "sweep"
-# What is varied in the sweep: duration [s] and angle [rad] of orbit_raise, 525 points.
-VARIED = {"duration": "5:17:25", "angle": "4:14:21"}
+# The arguments that stand for the sweeps, and the names of their pictures.
+SWEEP, PORKCHOP = "sweep", "porkchop"
+# What is varied in the sweeps: duration [s] and angle [rad] of orbit_raise, departure and flight time [s] from
+# one planet to another, 525 points each.
+SWEEPS = {
+    SWEEP: ("orbit_raise", {"duration": "5:17:25", "angle": "4:14:21"}, {"order": 8, "steps": 25}),
+    PORKCHOP: ("planet_to_planet", {"departure": "7:13:25", "flight": "1.5:7.5:21"}, {}),
+}
 
 
 def row(name: str, words: str, solution: Solution, holds: bool) -> str:
@@ -64,24 +69,26 @@ def draw_long_runs() -> None:
     save_page(stability_figure(runs, round_off(), growth()), GALLERY / f"{LONG_RUNS}.png", DPI)
 
 
-def draw_sweep() -> None:
-    """What the README's sweep of `orbit_raise` over 525 points draws."""
+def draw_sweep(name: str) -> None:
+    """What a sweep of the README over 525 points draws."""
+    problem, varied, numerics = SWEEPS[name]
     with TemporaryDirectory() as work:
-        data = sweep("orbit_raise", VARIED, Path(work) / "map.nc", order=8, steps=25)
-    save_page(sweep_figure(data), GALLERY / f"{SWEEP}.png", DPI)
-    reduce_colors(GALLERY / f"{SWEEP}.png")
+        data = sweep(problem, varied, Path(work) / "map.nc", **numerics)
+    save_page(sweep_figure(data), GALLERY / f"{name}.png", DPI)
+    reduce_colors(GALLERY / f"{name}.png")
 
 
 def main(names: list[str]) -> int:
     GALLERY.mkdir(exist_ok=True)
-    if SWEEP in names or not names:
-        draw_sweep()
+    for name in SWEEPS:
+        if name in names or not names:
+            draw_sweep(name)
     if LONG_RUNS in names or not names:
         draw_long_runs()
     print("| problem | what it is | command | objective | s |", "|---|---|---|---|---|", sep="\n")
     worst = 0
     wanted = names or sorted(path.stem for path in PROBLEMS.glob("*.py"))
-    for name in [name for name in wanted if name not in (LONG_RUNS, SWEEP)]:
+    for name in [name for name in wanted if name not in (LONG_RUNS, *SWEEPS)]:
         file = load_problem(str(PROBLEMS / f"{name}.py"))
         solution = solve(file.make())
         report = verify(solution) if solution.success else None

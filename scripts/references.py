@@ -79,6 +79,7 @@ NO_AIR = {"oblate": False, "air": False}
 TABLE = (
     Reference("point_to_point", "effort", 6 * 13**2 / 26**3, "closed form, 6 m² d² / T³", (4, 10), 1e-12),
     Reference("bang_bang", "least time", 2.0, "closed form, 2 √(m d / F)", (2, 400), 1e-8),
+    Reference("bryson_denham", "effort", 4.0, "closed form, 4 / (9 l) (Bryson 1963)", (2, 400), 1e-4),
     Reference("rendezvous", "effort", 1.048842323e-3, "controllability Gramian", (8, 12), 1e-9),
     Reference("orbit_raise", "effort", 1.6903228945e-3, "indirect shooting", (8, 25), 1e-10),
     Reference("drone_hop", "effort", 211.4604947, "indirect shooting", (8, 50), 1e-8),
@@ -108,6 +109,7 @@ TABLE = (
         "cw_impulses", "velocity change", 0.7645999702135722, "dual of the convex problem", (8, 12), 5e-8
     ),
     Reference("delta_iii", "mass", 7529.712, "Betts 2010", (6, 12), 1e-7),
+    Reference("two_stage_ascent", "mass", 20162.4824046, "shooting, linear tangent law", (8, 16), 1e-8),
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )
 NOTES = """

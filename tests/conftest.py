@@ -1,4 +1,21 @@
+from pathlib import Path
+
 import pytest
+
+# Names of tests, one a line, that take long although their neighbours with other parameters do not.
+LONG = Path(__file__).with_name("long_tests.txt")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Mark the tests that take long; a name in the list that is no test is an error."""
+    names = {line for line in LONG.read_text().splitlines() if line}
+    root = config.rootpath
+    found = {item.nodeid: item for item in items}
+    for name in names & found.keys():
+        found[name].add_marker(pytest.mark.slow)
+    whole = not config.option.keyword and config.args == [str(root / "tests")]
+    if whole and (gone := names - found.keys()):
+        raise pytest.UsageError(f"{LONG.name} names what is no test: {min(gone)}")
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -28,6 +28,7 @@ LAYERS = [
     ["solver", "checks"],
     ["missions"],
     ["structure"],
+    ["planners"],
     ["studies", "sweeps", "exports"],
     ["plots", "reports"],
     ["charts", "films"],
@@ -122,7 +123,7 @@ def test_the_front_loads_nothing_heavy():
     assert done.stdout.split() == []
 
 
-HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
+HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py", "pydantic"]
 
 
 @pytest.mark.parametrize(

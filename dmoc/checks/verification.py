@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,7 @@ from dmoc.results.flown_cost import unpriced
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
-# A row of motion, as a force, may be off by this part of the largest force of the actuator or the scene [-]:
-# Ipopt meets rows to a tolerance.
+# A row of motion, as a force, may be off by this part of the largest force of actuator or scene [-].
 RESIDUAL = 1e-6
 # The scheme marched forward may miss the path by this part of its extent and speed [-], times the factor by
 # which the path amplifies errors: the optimiser's errors grow on the way, too.
@@ -32,8 +32,7 @@ ROLLOUT = 1e-8
 ROLLOUT_MOST = 1e-3
 # Momentum, mass and the reported arrays may be off by this part of themselves [-]: they are exact sums.
 LEDGER = 1e-8
-# The constraint of the coordinates, the square of a quaternion's length less 1, may be off by this [-]: Ipopt
-# meets rows to a tolerance.
+# The square of a quaternion's length less 1 may be off by this [-]: Ipopt meets rows to a tolerance.
 CONSTRAINT = 1e-10
 # A body may turn by less than this between neighbouring nodes [rad]: beyond it the scheme has other solutions.
 TURN_MOST = np.radians(90)
@@ -116,28 +115,38 @@ def verify(
     with np.errstate(all="ignore"):
         evidence = Evidence(solution)
         undefined = evidence.undefined()
-        turning = evidence.path.attitudes
-        held = turning or evidence.problem.links
+        held = evidence.path.attitudes or evidence.problem.links
         ours = [(name, check) for name, check in CHECKS.items() if held or check is not _constraint]
-        wanted = [*ours, *_own(more)]
-        checks = tuple(
-            Check(name, np.inf, 0.0, "-", False, f"not a finite number: {undefined}")
-            if undefined
-            else of_kind(f"what the check {name!r} gives", check(evidence), Check)
-            for name, check in wanted
-        )
-    names = [check.name for check in checks]
-    if not undefined and (twice := {name for name in names if names.count(name) > 1}):
-        raise ValueError(f"more has a check of a name that is taken: {', '.join(sorted(twice))}")
+        wanted = [*ours, *own_checks(more)]
+        checks = tuple(not_finite(name, undefined) if undefined else check(evidence) for name, check in wanted)
+    if not undefined:
+        refuse_twins(checks)
     return Report(checks, time.perf_counter() - begun)
 
 
-def _own(more: Any) -> list[tuple[str, Callable[[Evidence], Check]]]:
+def not_finite(name: str, what: str) -> Check:
+    """A check that fails since something is no number."""
+    return Check(name, np.inf, 0.0, "-", False, f"not a finite number: {what}")
+
+
+def own_checks(more: Any) -> list[tuple[str, Callable[[Evidence], Check]]]:
     """Checks of the user's own, by the names of their functions until they have told theirs."""
     given = entries(more)
     if given is None or not all(map(callable, given)):
         raise ValueError(f"more must be functions of the evidence that give a dmoc.Check; got {short(more)}")
-    return [(getattr(check, "__name__", type(check).__name__), check) for check in given]
+
+    def told(name: str, check: Callable[[Evidence], Any], evidence: Evidence) -> Check:
+        return of_kind(f"what the check {name!r} gives", check(evidence), Check)
+
+    names = [getattr(check, "__name__", type(check).__name__) for check in given]
+    return [(name, partial(told, name, check)) for name, check in zip(names, given, strict=True)]
+
+
+def refuse_twins(checks: Sequence[Check]) -> None:
+    """ValueError if two checks have one name."""
+    names = [check.name for check in checks]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ValueError(f"more has a check of a name that is taken: {', '.join(sorted(twice))}")
 
 
 def _residual(evidence: Evidence) -> Check:

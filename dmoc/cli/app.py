@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import new as new_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
 from dmoc.cli import study as study_command
@@ -29,10 +30,10 @@ from dmoc.cli.options import (
     Steps,
     Version,
     attached,
-    draw_solution,
     ends_at_once,
     fail,
     problem_of,
+    seen,
     show_answer,
     switch,
     transfer_of,
@@ -66,6 +67,9 @@ def list_problems() -> None:
     if not found:
         raise ValueError(f"no problem files in {' or '.join(map(str, library.folders()))}")
     report.console().print(report.pairs(found))
+
+
+app.command(epilog="Example: dmoc new my_flight --from orbit_raise")(new_command.new)
 
 
 @app.command(epilog="Example: dmoc show free_flyer")
@@ -171,7 +175,26 @@ def plot(
 
         save_sweep(sweep_data.read_sweep(file), target)
     else:
-        draw_solution(file, target, source)
+        from dmoc.plots.page import save_figure
+
+        save_figure(seen(file, source), target)
+    report.console().print(f"wrote {target}")
+
+
+@app.command(epilog="Example: dmoc animate flight.nc --out flight.mp4")
+def animate(
+    file: File,
+    out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .gif if not given.")] = None,
+    frames: Annotated[int, typer.Option(help="Number of frames, 2 to 200; 20 are shown a second.")] = 80,
+    source: Source = None,
+) -> None:
+    """Write a moving picture of a saved solution."""
+    import dmoc
+    from dmoc.reports import words as report
+
+    target = file.with_suffix(".gif") if out is None else out
+    writable(target, moving=True)
+    dmoc.animate(seen(file, source), target, frames)
     report.console().print(f"wrote {target}")
 
 
@@ -183,6 +206,9 @@ def export(
     steps: Steps = None,
     hold: Hold = False,
     settings: Settings = None,
+    guess: Annotated[
+        Path | None, typer.Option(help="A saved solution for the solver to start from; best for a mission.")
+    ] = None,
     no_c: Annotated[bool, switch("--no-c", help="Leave out the C code.")] = False,
 ) -> None:
     """Write integrator, residual and solver of a problem as CasADi files and C code.
@@ -194,8 +220,9 @@ def export(
     import dmoc
     from dmoc.reports import words as report
 
-    problem = transfer_of(name, settings, "export")
-    paths = dmoc.export(problem, folder, 2 if order is None else order, steps, hold, c=not no_c)
+    _, problem = problem_of(name, settings)
+    start = None if guess is None else dmoc.load(guess)
+    paths = dmoc.export(problem, folder, order, steps, hold, not no_c, start)
     functions = json.loads(paths[0].read_text())["functions"]
     console = report.console()
     console.print(report.pairs([(name, entry["words"]) for name, entry in functions.items()]))

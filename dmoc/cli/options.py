@@ -76,7 +76,12 @@ Steps = Annotated[
 ]
 Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
 Structure = Annotated[
-    bool, switch("--structure", help="Make burns, coasts and touches of a coarse answer legs with free ends.")
+    bool | None,
+    switch(
+        "--structure/--no-structure",
+        help="Make burns, coasts and touches of a coarse answer legs with free ends; where --tol is below 1e-5 "
+        "it is tried.",
+    ),
 ]
 Impulses = Annotated[
     str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")
@@ -173,19 +178,18 @@ def _named(name: str, source_hash: str) -> str | None:
     return name if name.isidentifier() and has_problem(name) else None
 
 
-def draw_solution(file: Path, target: Path, source: str | None) -> None:
-    """Draw a saved solution; without its problem, what the file itself has."""
+def seen(file: Path, source: str | None) -> Any:
+    """A saved solution to draw; without its problem, what the file itself has."""
     import dmoc
-    from dmoc.plots.page import save_figure
 
     try:
-        solution = attached(file, source)
+        return attached(file, source)
     except ValueError as error:
         solution = dmoc.load(file)
         if source is not None:
             raise
         warn(f"zones and limits are left out: {error}")
-    save_figure(solution, target)
+        return solution
 
 
 def show_answer(

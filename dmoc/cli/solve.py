@@ -50,7 +50,7 @@ def solve(
             metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
         ),
     ] = 1,
-    structure: Structure = False,
+    structure: Structure = None,
     impulses: Impulses = None,
     time_limit: Annotated[
         float | None,

@@ -23,19 +23,22 @@ def stability(
     revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
     eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
     steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
-    turned: Annotated[int, typer.Option(help="Steps of the bodies that turn, at least 10.")] = 2_000,
+    turned: Annotated[
+        int, typer.Option(help="Steps of bodies that turn or hang on rods, at least 10.")
+    ] = 2_000,
     plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure numerical stability: drift over many revolutions, rounding, the longest stable steps.
 
-    Coasts Kepler orbits and turns a free body and a heavy top by the schemes of order 2 to 8, by RK4 and by
-    DOP853.
+    Coasts Kepler orbits, turns a free body and a heavy top, and lets a double pendulum swing, by the schemes of
+    order 2 to 8, by RK4 and by DOP853.
     """
     from dmoc.reports import words as report
     from dmoc.studies.drift import drift, kepler, per_revolution
     from dmoc.studies.rounding import growth, round_off
     from dmoc.studies.spinning import free_body, heavy_top, spin
+    from dmoc.studies.swinging import double_pendulum, swing
 
     writable(plot, drawn=True)
     orbits = [(kepler(value), per_revolution(value)) for value in _eccentricities(eccentricity)]
@@ -45,6 +48,7 @@ def stability(
         edges = growth()
         runs = [(orbit.name, drift(orbit, revolutions, methods)) for orbit, methods in orbits]
         turns = [(body.name, spin(body, turned)) for body in (free_body(), heavy_top())]
+        swings = swing(double_pendulum(), turned)
     if plot is not None:
         from dmoc.charts.stability import stability_figure
         from dmoc.charts.study import save_page
@@ -53,10 +57,10 @@ def stability(
     if as_json:
         from dmoc.reports.as_json import as_text
 
-        print(as_text(_object(runs, rounding, edges, turns)))
+        print(as_text(_object(runs, rounding, edges, turns, swings)))
         return
     console = report.console()
-    for part in _tables(runs, rounding, edges, turns):
+    for part in _tables(runs, rounding, edges, turns, swings):
         console.print(part)
     if plot is not None:
         console.print(f"wrote {plot}")
@@ -69,7 +73,7 @@ def _eccentricities(text: str) -> list[float]:
         raise ValueError(f"--eccentricity must be numbers with commas, such as 0.3,0.7; got {text!r}") from None
 
 
-def _object(runs: list, rounding: list, edges: list, turns: list) -> dict[str, Any]:
+def _object(runs: list, rounding: list, edges: list, turns: list, swings: list) -> dict[str, Any]:
     """The JSON object."""
     figures = ("method", "steps", "revolutions", "energy_error", "momentum_error", "growth", "seconds")
 
@@ -80,6 +84,7 @@ def _object(runs: list, rounding: list, edges: list, turns: list) -> dict[str, A
             for row in rows
         ],
         "turning": [{"body": body} | asdict(row) for body, rows in turns for row in rows],
+        "swinging": [asdict(row) for row in swings],
         "round_off": [
             {
                 "form": row.form,
@@ -97,7 +102,7 @@ def _object(runs: list, rounding: list, edges: list, turns: list) -> dict[str, A
     }
 
 
-def _tables(runs: list, rounding: list, edges: list, turns: list) -> list[RenderableType]:
+def _tables(runs: list, rounding: list, edges: list, turns: list, swings: list) -> list[RenderableType]:
     from rich.text import Text
 
     parts: list[RenderableType] = []
@@ -122,7 +127,7 @@ def _tables(runs: list, rounding: list, edges: list, turns: list) -> list[Render
         # a growth below 1 is amplitude lost; at h omega = 1 a step is a sixth of an oscillation
         lost = 1 - float(row.growth[row.reach.searchsorted(1.0)])
         table.add_row(row.method, f"{low:.3f}", until, f"{lost:.1e}" if lost > 1e-12 else "nothing")
-    return [*parts, table, "", *_turning_tables(turns)]
+    return [*parts, table, "", *_turning_tables(turns), *_swinging_table(swings)]
 
 
 def _turning_tables(turns: list) -> list[RenderableType]:
@@ -141,6 +146,19 @@ def _turning_tables(turns: list) -> list[RenderableType]:
             table.add_row(row.method, f"{row.length:g}", cost, *errors, f"{row.growth:.2g}")
         parts += [table, ""]
     return parts
+
+
+def _swinging_table(rows: list) -> list[RenderableType]:
+    from rich.text import Text
+
+    title = f"A double pendulum of rods, swinging freely, {rows[0].steps:,} steps"
+    table = _right_aligned("method", "h [s]", "us/step", "rods off by [m]", "energy", "growth")
+    for row in rows:
+        cost = f"{1e6 * row.seconds / row.steps:.0f}"
+        errors = (f"{row.gap:.1e}", f"{row.energy_error:.1e}")
+        table.add_row(row.method, f"{row.length:g}", cost, *errors, f"{row.growth:.2g}")
+    words = "RK4 and DOP853 integrate the equations with the rods differentiated twice: what opens stays open"
+    return [Text(title, "bold"), table, Text(words, "dim")]
 
 
 def _drift_table(rows: list) -> Table:

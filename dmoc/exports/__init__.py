@@ -1,1 +1,1 @@
-"""Functions for others to run."""
+"""Functions for others to run, as files."""

@@ -9,9 +9,10 @@ from pathlib import Path
 import casadi as ca
 
 from dmoc.exports.example import example_call, in_comment, macro_of
-from dmoc.exports.functions import Scene
-from dmoc.exports.planner import Planner
-from dmoc.exports.terms import Exported
+from dmoc.planners.functions import Scene
+from dmoc.planners.mission import MissionPlanner
+from dmoc.planners.planner import Planner
+from dmoc.planners.terms import Exported
 
 # What stands before CasADi's own code.
 PREFACE = """\
@@ -46,6 +47,26 @@ HEADER = """\
 
 def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) -> None:
     """functions.c, functions.h, transfer.h and main.c of step, rollout and residual, in a folder."""
+    _generate(functions, folder)
+    (folder / "transfer.h").write_text(_header(planner.scene, functions))
+    by_name = {exported.function.name(): exported.function for exported in functions}
+    (folder / "main.c").write_text(example_call(planner, by_name["rollout"], by_name["residual"]))
+
+
+def write_mission_code(planner: MissionPlanner, functions: Sequence[Exported], folder: Path) -> None:
+    """functions.c, functions.h and mission.h of a mission's steps, rollouts and residual, in a folder."""
+    _generate(functions, folder)
+    sizes: dict[str, tuple[int, str]] = {}
+    for name, words, scene in zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True):
+        about = f"of {in_comment(words)}, order {scene.rule.order}"
+        sizes[f"{name.upper()}_STEPS"] = scene.steps, f"steps {about}"
+        sizes[f"{name.upper()}_NODES"] = scene.nodes, f"nodes {about}"
+    text = _filled(planner.mission.name, f"{len(planner.names)} legs", functions, sizes)
+    (folder / "mission.h").write_text(text.replace("DMOC_TRANSFER_H", "DMOC_MISSION_H"))
+
+
+def _generate(functions: Sequence[Exported], folder: Path) -> None:
+    """functions.c and functions.h, whole."""
     generator = ca.CodeGenerator("functions.c", {"with_header": True})
     for exported in functions:
         generator.add(exported.function)
@@ -56,9 +77,6 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
             raise OSError(f"{name} could not be written whole")
     source = folder / "functions.c"
     source.write_text(PREFACE + source.read_text())
-    (folder / "transfer.h").write_text(_header(planner.scene, functions))
-    by_name = {exported.function.name(): exported.function for exported in functions}
-    (folder / "main.c").write_text(example_call(planner, by_name["rollout"], by_name["residual"]))
 
 
 def _header(scene: Scene, functions: Sequence[Exported]) -> str:
@@ -74,9 +92,14 @@ def _header(scene: Scene, functions: Sequence[Exported]) -> str:
         "CONTROLS": (scene.controls, ", ".join(scene.problem.actuator.labels(scene.axes))),
         "FORCES": (scene.shape("forces")[1], f"columns of forces, {kind}"),
     }
+    about = f"order {scene.rule.order}, {scene.steps} steps, forces {kind}"
+    return _filled(scene.problem.name, about, functions, sizes)
+
+
+def _filled(name: str, about: str, functions: Sequence[Exported], sizes: dict[str, tuple[int, str]]) -> str:
     return HEADER.format(
-        name=in_comment(scene.problem.name),
-        about=f"order {scene.rule.order}, {scene.steps} steps, forces {kind}",
+        name=in_comment(name),
+        about=about,
         documentation="".join(_documentation(exported) for exported in functions),
         sizes="\n".join(f"#define DMOC_{name} {size} /* {words} */" for name, (size, words) in sizes.items()),
     )

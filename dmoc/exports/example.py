@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.exports.functions import Scene
-from dmoc.exports.planner import Planner
-from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, WHEELS
+from dmoc.planners.functions import Scene
+from dmoc.planners.planner import Planner
+from dmoc.planners.terms import ATTITUDE, PLACE, TERMS, WHEELS
 
 # A program that calls rollout and residual.
 EXAMPLE = """\

@@ -5,43 +5,42 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import platform
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
-from dmoc import __version__
 from dmoc.basics.arguments import flag, of_kind
 from dmoc.basics.files import as_path, json_object, sealed_object, unsealed_object
-from dmoc.exports import functions as export_functions
-from dmoc.exports import planner as export_solver
-from dmoc.exports import residual as export_residual
-from dmoc.exports.code import write_code
-from dmoc.exports.planner import Planner
-from dmoc.exports.readme import readme
-from dmoc.exports.terms import Exported
+from dmoc.exports.code import write_code, write_mission_code
+from dmoc.exports.manifest import EXPORT_FORMAT, EXPORT_VERSION, about_mission, about_transfer, manifest, plain
+from dmoc.exports.readme import mission_readme, readme
 from dmoc.motion.lobatto import scheme
+from dmoc.planners import functions as export_functions
+from dmoc.planners import planner as export_solver
+from dmoc.planners import residual as export_residual
+from dmoc.planners.mission import MissionPlanner
+from dmoc.planners.planner import Planner
+from dmoc.planners.terms import Exported
+from dmoc.planners.whole import coded, mission_functions
+from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import DEFAULT_STEPS
+from dmoc.solver.solve import check_numerics
 
-# The manifest names this format: a folder whose manifest does not is never written over.
-EXPORT_FORMAT = "dmoc export"
-# The version of the manifest, for programs that read it: one of version 1 has no checksum of its own.
-EXPORT_VERSION = 2
 # The remedy that is told where a folder holds what an export must not take the place of.
 MOVE = "name a new folder, or move what is there"
 
 
 def export(
-    problem: TransferProblem,
+    problem: TransferProblem | Mission,
     folder: str | os.PathLike,
-    order: int = 2,
+    order: int | None = None,
     steps: int | None = None,
     hold: bool = False,
     c: bool = True,
@@ -67,20 +66,26 @@ def export(
     `largest_turn` [rad] between neighbouring nodes is far below pi/2 in a plan that is right. The solver takes
     either sign of an attitude. What is no argument, such as the inertia, is fixed.
 
+    Of a mission each leg has its `step` and `rollout`, named with the leg behind; `residual`, `cost` and the
+    solvers are those of the whole, with the unknowns of all legs, impulses and flybys as arguments by name. It
+    stands on the meshes of `guess`, or on those from which a solve begins. Best is a solution: the exported
+    solver has no rounding of impulses that falls step by step, and from a poor guess it may fail.
+
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.
 
     Parameters
     ----------
-    problem : TransferProblem
+    problem : TransferProblem or Mission
     folder : path
         Made by this call; if it is there, it must be empty or hold an earlier export as it was written and
         nothing else.
         It is written whole or not at all.
-    order : int
-        2, 4, 6 or 8.
+    order : int, optional
+        2, 4, 6 or 8; 2 if not given, of a mission as it is solved or as its guess is.
     steps : int, optional
-        Equal steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8 if not given.
+        Equal steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8 if not given. Of a mission the steps of
+        each leg, equal or as the guess has them.
     hold : bool
         Forces constant over each step.
     c : bool
@@ -105,24 +110,52 @@ def export(
     ValueError
         If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
     """
-    steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
-    of_kind("problem", problem, TransferProblem)
+    problem = getattr(problem, "alone", None) or problem
+    mission = hasattr(problem, "joints")
+    of_kind("problem", problem, Mission if mission else TransferProblem)
     hold, c = flag("hold", hold), flag("c", c)
     target = _checked_folder(as_path(folder))
-    planner = Planner.of(problem, order, steps, hold, guess)
-    functions = functions_of(planner, options)
+    made = _of_mission if mission else _of_transfer
+    functions, count, about, words, write = made(problem, (order, steps, hold, guess), options, c)
     with _whole_folder(target) as work:
         for exported in functions:
             _save(exported.function, work / f"{exported.function.name()}.casadi")
         if c:
             (work / "c").mkdir()
-            write_code(planner, functions[:3], work / "c")
-        (work / "README.md").write_text(readme(planner.scene, c))
+            write(functions[:count], work / "c")
+        (work / "README.md").write_text(words)
         files = sorted(path.relative_to(work) for path in work.rglob("*") if path.is_file())
         sums = {file.as_posix(): hashlib.sha256((work / file).read_bytes()).hexdigest() for file in files}
-        plain = json.loads(json.dumps(_manifest(planner, functions, c, sums), default=_plain))
-        (work / "manifest.json").write_text(json.dumps(sealed_object(plain), indent=1) + "\n")
+        entries = json.loads(json.dumps(manifest(about, functions, count * c, sums), default=plain))
+        (work / "manifest.json").write_text(json.dumps(sealed_object(entries), indent=1) + "\n")
     return [target / "manifest.json", *(target / file for file in files)]
+
+
+class _Contents(NamedTuple):
+    """Functions, how many of them can be C code, what the manifest and the readme say, and how C is written."""
+
+    functions: list[Exported]
+    in_c: int
+    about: dict[str, Any]
+    words: str
+    write: Callable[[Sequence[Exported], Path], None]
+
+
+def _of_transfer(problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool) -> _Contents:
+    order, steps, hold, guess = numerics
+    order = 2 if order is None else order
+    steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
+    planner = Planner.of(problem, order, steps, hold, guess)
+    words, write = readme(planner.scene, c), partial(write_code, planner)
+    return _Contents(functions_of(planner, options), 3, about_transfer(planner), words, write)
+
+
+def _of_mission(problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool) -> _Contents:
+    order, steps, hold, _ = numerics
+    check_numerics(order, steps, None, hold, options, None, None)
+    planner = MissionPlanner.of(problem, *numerics)
+    functions, write = mission_functions(planner, options), partial(write_mission_code, planner)
+    return _Contents(functions, coded(planner), about_mission(planner), mission_readme(planner, c), write)
 
 
 def functions_of(planner: Planner, options: dict[str, Any] | None = None) -> list[Exported]:
@@ -145,48 +178,6 @@ def _save(function: ca.Function, file: Path) -> None:
     content = ca.StringSerializer()
     content.pack(function)
     file.write_bytes(content.encode().encode())
-
-
-def _manifest(planner: Planner, functions: list[Exported], c: bool, sums: dict[str, str]) -> dict[str, Any]:
-    scene, problem = planner.scene, planner.scene.problem
-    coded = {exported.function.name() for exported in functions[:3] if c}
-    return {
-        "format": EXPORT_FORMAT,
-        "format_version": EXPORT_VERSION,
-        "problem": {"name": problem.name, "parameters": problem.parameters},
-        "scheme": {"order": scene.rule.order, "steps": scene.steps, "hold": scene.hold, "nodes": scene.nodes},
-        "controls": list(problem.actuator.labels(scene.axes)),
-        "versions": {
-            "dmoc": __version__,
-            "casadi": ca.__version__,
-            "numpy": np.__version__,
-            "python": platform.python_version(),
-        },
-        "functions": {
-            exported.function.name(): _entry(exported, exported.function.name() in coded)
-            for exported in functions
-        },
-        "files": sums,
-    }
-
-
-def _entry(exported: Exported, coded: bool) -> dict[str, Any]:
-    f = exported.function
-    places = {
-        "inputs": [(f.name_in(i), f.size_in(i)) for i in range(f.n_in())],
-        "outputs": [(f.name_out(i), f.size_out(i)) for i in range(f.n_out())],
-    }
-    lists = {
-        kind: [{"name": name, "shape": list(shape), **vars(exported.term(name))} for name, shape in found]
-        for kind, found in places.items()
-    }
-    files = {"file": f"{f.name()}.casadi"} | ({"c": "c/functions.c"} if coded else {})
-    return {"words": exported.words, **files, **lists}
-
-
-def _plain(value: Any) -> Any:
-    """What JSON does not know: arrays as lists, everything else as text."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _checked_folder(folder: Path) -> Path:
@@ -217,10 +208,10 @@ def _exported_before(folder: Path, there: set[str]) -> dict[str, str]:
     if "manifest.json" not in there:
         return {}
     text = (folder / "manifest.json").read_bytes()
-    manifest = json_object(text) or {}
-    version, files = manifest.get("format_version"), manifest.get("files")
+    listed = json_object(text) or {}
+    version, files = listed.get("format_version"), listed.get("files")
     whole = version == 1 or unsealed_object(text) is not None
-    if manifest.get("format") != EXPORT_FORMAT or not isinstance(files, dict):
+    if listed.get("format") != EXPORT_FORMAT or not isinstance(files, dict):
         raise ValueError(f"cannot export to {folder}: its manifest.json is no manifest of an export; {MOVE}")
     if isinstance(version, int) and version > EXPORT_VERSION and whole:
         raise ValueError(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dmoc.exports.functions import Scene
-from dmoc.exports.terms import TERMS
+from dmoc.planners.functions import Scene
+from dmoc.planners.mission import MissionPlanner
+from dmoc.planners.terms import TERMS
 
 README = """\
 # Functions of {name}
@@ -61,4 +62,49 @@ def readme(scene: Scene, c: bool) -> str:
         shown=", ".join(f"`{name}` [{unit}]" for name, unit in parts) + (" show" if parts[1:] else " shows"),
         body=TURNING if scene.turns else "",
         code=CODE if c else "",
+    )
+
+
+MISSION = """\
+# Functions of {name}
+
+`manifest.json` lists every function with shape, unit and meaning of its arguments, and the SHA-256 of every
+file here. All values are in SI units; matrices have one column a node, a step end or a step. The names of
+arguments that belong to a leg begin with that of the leg: {legs}.
+
+A `.casadi` file is code: CasADi runs what it holds. Load one only if you trust where it comes from.
+
+Python, with CasADi alone:
+
+    import casadi as ca
+    nominal, solver = ca.Function.load("nominal.casadi"), ca.Function.load("solver.casadi")
+    inputs = nominal()                     # the mission's own numbers and its guess, by name
+    inputs["mass"] *= 1.01                 # a little heavier than the mission states
+    plan = solver(**inputs)
+    print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
+
+The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
+(of rows and bounds, scaled) are small; that it is an optimum only the status says. `residual` gives the same
+for any path: what is left of the rows of each leg and of each joint, 0 where they hold.
+
+`step_{leg}` is one step of a leg for any step length, `rollout_{leg}` all of its steps, on the mesh that the
+manifest lists. What happens between legs, such as an impulse, stands in the plan: add it to the velocity before
+the next rollout.
+
+To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too. What
+is no input of the solver is fixed in it: what events are made of, such as the limit of an impulse or a mass
+that is dropped, the meshes, and which impulses are none. An attitude at start or goal must have the sign that
+the guess has there.
+{code}"""
+
+MISSION_CODE = """
+C: `c/functions.c` needs nothing but the mathematical library; `c/mission.h` documents it.
+"""
+
+
+def mission_readme(planner: MissionPlanner, c: bool) -> str:
+    """The text for a mission, with or without C code."""
+    legs = ", ".join(f"`{name}`" for name in planner.names)
+    return MISSION.format(
+        name=planner.mission.name, legs=legs, leg=planner.names[0], code=MISSION_CODE if c else ""
     )

@@ -10,6 +10,8 @@ import numpy as np
 from dmoc.basics.arguments import of_kind, short
 from dmoc.basics.files import as_path, whole_file
 from dmoc.films.frames import Scene, scene_of
+from dmoc.missions.solution import MissionSolution
+from dmoc.plots.mission import scenery
 from dmoc.plots.style import AXIS_COLOURS, CHANNEL_COLOURS, DARK, PALE, PUSH, SETTINGS, readable
 from dmoc.plots.surroundings import draw_scene, view_of
 from dmoc.results.solution import Solution
@@ -20,14 +22,20 @@ SUFFIXES = (".gif", ".mp4")
 MOST_FRAMES, RATE = 200, 20
 # A film is so large [inches], of so many dots an inch.
 SIZE, DOTS = (7.2, 5.6), 90
+# About so many letters of a legend, with the lines before them, have room beside each other.
+ROW = 72
+# Times so near to each other are the same, as a part of the film [-].
+NEAR = 1e-9
 
 
-def animate(solution: Solution, path: str | os.PathLike, frames: int = 80) -> None:
+def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frames: int = 80) -> None:
     """Write a moving picture of a solution, whole or not at all.
+
+    Of a mission each leg has its colour; joints are marked, and the arrow of an impulse stays from its time on.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or MissionSolution
     path : path
         Ends in .gif or, where ffmpeg is on the computer, in .mp4.
     frames : int
@@ -38,11 +46,13 @@ def animate(solution: Solution, path: str | os.PathLike, frames: int = 80) -> No
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
-    of_kind("solution", solution, Solution)
+    mission = hasattr(solution, "legs")
+    of_kind("solution", solution, MissionSolution if mission else Solution)
     check_target(path)
     if type(frames) is not int or not 2 <= frames <= MOST_FRAMES:
         raise ValueError(f"frames must be a whole number from 2 to {MOST_FRAMES}; got {short(frames)}")
-    if not np.isfinite(solution.path.position).all():
+    legs: Any = getattr(solution, "legs", [solution])
+    if not all(np.isfinite(leg.path.position).all() for leg in legs):
         raise ValueError("the path is not finite, so there is nothing to show")
     import matplotlib
     from matplotlib import animation
@@ -51,13 +61,39 @@ def animate(solution: Solution, path: str | os.PathLike, frames: int = 80) -> No
     scene = scene_of(solution, frames)
     with matplotlib.rc_context(SETTINGS), whole_file(path) as temporary:
         page = Figure(figsize=SIZE)
-        film = _Film(page, solution, scene)
-        moving = as_path(path).suffix.lower() == ".mp4"
-        writer: Any = animation.FFMpegWriter(fps=RATE) if moving else animation.PillowWriter(fps=RATE)
+        film = _Film(page, scenery(solution) if mission else solution, scene)  # type: ignore[arg-type]
+        if as_path(path).suffix.lower() == ".gif":
+            _write_gif(film, page, temporary, frames)
+            return
+        writer: Any = animation.FFMpegWriter(fps=RATE)
         with writer.saving(page, str(temporary), DOTS):
             for frame in range(frames):
                 film.show(frame)
                 writer.grab_frame()
+
+
+def _write_gif(film: _Film, page: Any, target: Any, frames: int) -> None:
+    """Draw what stands still once, and only what moves for each frame."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    page.set_dpi(DOTS)
+    canvas = FigureCanvasAgg(page)
+    for artist in film.moving:
+        artist.set_animated(True)
+    canvas.draw()
+    still = canvas.copy_from_bbox(page.bbox)
+    images = []
+    for frame in range(frames):
+        canvas.restore_region(still)
+        film.show(frame)
+        for artist in film.moving:
+            film.axes.draw_artist(artist)
+        images.append(Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
+    # One palette for all frames: that of the last, where all there is has come into view.
+    palette = images[-1].quantize(255)
+    images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    images[0].save(target, save_all=True, append_images=images[1:], duration=1000 // RATE, loop=0)
 
 
 def check_target(path: str | os.PathLike) -> None:
@@ -87,24 +123,42 @@ class _Film:
             getattr(self.axes, f"set_{name}label")(label, labelpad=pad)
         if solution.dimension == 1:
             self.axes.set_yticks([])
-        self.ahead = [self._line(path, color=PALE, linewidth=1.2) for path in scene.places]
-        look: dict[str, Any] = {"linewidth": 2.0}
-        colours = [CHANNEL_COLOURS[i % len(CHANNEL_COLOURS)] for i in range(len(scene.places))]
-        self.behind = [self._line(p[:1], color=c, **look) for p, c in zip(scene.places, colours, strict=True)]
+        self.ahead = [self._line(trail.points, color=PALE, linewidth=1.2) for trail in scene.trails]
+        self.behind = [
+            self._line(trail.points[:1], color=trail.colour, linewidth=2.0) for trail in scene.trails
+        ]
+        if len(scene.joints):
+            self._line(scene.joints, color=DARK, marker="D", markersize=6, fillstyle="none", linestyle="none")
+        self.kicks = [self._line(arrow[:1], color=DARK, linewidth=2.2) for _, arrow in scene.kicks]
         self.links = [self._line(line[0], color=DARK, linewidth=2.2) for line in scene.links]
         self.triads = [
             self._line(arm[0], color=AXIS_COLOURS[i % 3], linewidth=2.0) for i, arm in enumerate(scene.triads)
         ]
         self.pushes = [self._line(push[0], color=PUSH, linewidth=2.6) for push in scene.pushes]
         dot: dict[str, Any] = {"marker": "o", "markersize": 8, "linestyle": "none"}
-        self.bodies = [self._line(p[:1], color=c, **dot) for p, c in zip(scene.places, colours, strict=True)]
-        named = [(line, name) for line, name in zip(self.bodies, scene.names, strict=True) if name]
+        self.bodies = [
+            self._line(path[:1], color=CHANNEL_COLOURS[i % len(CHANNEL_COLOURS)], **dot)
+            for i, path in enumerate(scene.places)
+        ]
+        named = list(zip(self.bodies, scene.names, strict=True))
+        named += {
+            trail.name: (line, trail.name) for line, trail in zip(self.behind, scene.trails, strict=True)
+        }.values()
         if self.pushes:
             named.append((self.pushes[0], scene.push_words))
+        if self.kicks:
+            named.append((self.kicks[0], "impulse"))
+        named = [one for one in named if one[1]]
+        rows = 1 + sum(len(name) + 6 for _, name in named) // ROW
         if named:
-            page.legend(*zip(*named, strict=True), loc="lower center", ncol=6)
+            columns = -(-len(named) // rows)
+            page.legend(*zip(*named, strict=True), loc="lower center", ncol=columns)
         if not space:
-            page.subplots_adjust(bottom=0.17)
+            page.subplots_adjust(bottom=0.12 + 0.05 * rows)
+        self.title = self.axes.set_title("", loc="left")
+        lines = self.behind, self.kicks, self.links, self.triads, self.pushes, self.bodies
+        # All that is not the same in every frame, from what is behind to what is before it.
+        self.moving = [*(line for group in lines for line in group), self.title]
 
     def _surround(self, solution: Solution, space: bool) -> None:
         """Zones and attractors, and a view that holds all that moves."""
@@ -143,11 +197,17 @@ class _Film:
     def show(self, frame: int) -> None:
         """Move all lines to a frame."""
         scene = self.scene
-        for path, line, dot in zip(scene.places, self.behind, self.bodies, strict=True):
-            self._move(line, path[: frame + 1])
+        for path, dot in zip(scene.places, self.bodies, strict=True):
             self._move(dot, path[frame : frame + 1])
+        now = scene.times[frame]
+        for line, trail in zip(self.behind, scene.trails, strict=True):
+            gone = trail.points[trail.times <= now]
+            here = scene.places[trail.body][frame : frame + 1 if len(gone) < len(trail.points) else frame]
+            self._move(line, np.concatenate([gone, here]) if len(gone) else gone)
+        for line, (late, arrow) in zip(self.kicks, scene.kicks, strict=True):
+            self._move(line, arrow[: len(arrow) if late <= now + NEAR * np.ptp(scene.times) else 0])
         moving = ((self.links, scene.links), (self.triads, scene.triads), (self.pushes, scene.pushes))
         for lines, points in moving:
             for line, known in zip(lines, points, strict=True):
                 self._move(line, known[min(frame, len(known) - 1)])
-        self.axes.set_title(f"t = {scene.times[frame] / self.late:.2f} {self.late_unit}", loc="left")
+        self.title.set_text(f"t = {scene.times[frame] / self.late:.2f} {self.late_unit}")

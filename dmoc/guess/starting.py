@@ -43,6 +43,8 @@ def starting_guess(
     given = problem.guess if given is None else given
     force = getattr(given, "force", None)
     given = getattr(given, "path", given)
+    if hasattr(given, "as_one"):
+        given = given.as_one(problem.controls)
     if problem.inertia is not None and not problem.links:
         # What turns bodies is loaded for problems with such bodies alone.
         from dmoc.guess.turning import turning_guess

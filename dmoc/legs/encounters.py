@@ -96,6 +96,10 @@ class Bounce(Event):
         velocity = here.v - (1 + self.restitution) * across * normal
         return Passed(here._replace(v=velocity), [Row("surface", value, 0.0, 0.0)])
 
+    @property
+    def keeps_energy(self) -> bool:  # type: ignore[override]
+        return self.restitution == 1
+
     def words(self) -> str:
         return f"an impact of restitution {self.restitution:g}"
 

@@ -25,6 +25,8 @@ class Free(Boundary):
     axes: int = 0
     # Whether the state is that of the start once more.
     closes: ClassVar[bool] = False
+    # The number of axes shapes a solve, and is no number that one may change.
+    counts: ClassVar[tuple[str, ...]] = ("axes",)
 
     def __post_init__(self) -> None:
         whole("Free: axes", self.axes, least=0)
@@ -46,7 +48,8 @@ class Free(Boundary):
 class Periodic(Free):
     """The state of the start once more: the mission may be repeated.
 
-    Where the motion keeps an energy one velocity follows from the others, and is not asked for again.
+    Where the motion keeps an energy, in coasts on which nothing does work, one velocity follows from the
+    others, and is not asked for again.
     """
 
     closes: ClassVar[bool] = True

@@ -43,6 +43,8 @@ class Event(ABC):
 
     # Whether its unknowns are a velocity change, which costs.
     pushes: ClassVar[bool] = False
+    # Whether the energy per mass is the same before and behind it.
+    keeps_energy: ClassVar[bool] = False
 
     def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
         """Name and unit of each unknown of its own, in a space of so many axes."""
@@ -141,6 +143,7 @@ class Drop(Event):
     """
 
     mass: float
+    keeps_energy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         checked(self, mass=number("Drop: mass", self.mass, "kg", positive=True))
@@ -170,6 +173,7 @@ class Via(Event):
     """
 
     boundary: Any
+    keeps_energy: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         place = entries(self.boundary)
@@ -202,11 +206,17 @@ class Via(Event):
 
 def condition_rows(boundary: Boundary, here: Instant) -> list[Row]:
     """What a boundary asks of a state: its fixed entries as rows, then its other conditions."""
-    rows = []
+    return [*fixed_rows(boundary, here, np.concatenate(boundary.fixed())), *boundary.rows(*here)]
+
+
+def fixed_rows(boundary: Boundary, here: Instant, values: Any) -> list[Row]:
+    """Rows of the fixed entries of a boundary; `values` are all of them, or symbols that stand for them."""
+    rows, first = [], 0
     for name, fixed, now, unit in zip(
         ("position", "velocity"), boundary.fixed(), (here.q, here.v), ("m", "m/s"), strict=True
     ):
-        for i in np.flatnonzero(~np.isnan(fixed)):
+        for i in map(int, np.flatnonzero(~np.isnan(fixed))):
             label = f"{name}.{'xyz'[i] if len(fixed) <= 3 else i}"
-            rows.append(Row(label, now[int(i)] - float(fixed[i]), 0.0, 0.0, unit))
-    return [*rows, *boundary.rows(here.t, here.q, here.v, here.m)]
+            rows.append(Row(label, now[i] - values[first + i], 0.0, 0.0, unit))
+        first += len(fixed)
+    return rows

@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.optimality import idle, left_over
-from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report
+from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report, not_finite, own_checks, refuse_twins
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
@@ -30,10 +30,10 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
 
     Every leg is checked as a transfer between its two states, and the worst one is told; `joints` compares the
     states, times and masses beside each joint and what must hold there; `optimality` are the first-order
-    conditions of the whole mission; `primer` says whether another impulse would help.
+    conditions of the whole mission; `primer` says whether another impulse would help. Each of `more`, which
+    takes the `Evidence` of a leg, is told of the worst leg, too.
     """
-    if more:
-        raise ValueError("a mission takes no checks of your own yet; verify(solution.legs[k], more=...) does")
+    own = own_checks(more)
     solution = solution if problem is None else solution.attach(problem)
     begun, mission = time.perf_counter(), solution.require_problem()
     with np.errstate(all="ignore"):
@@ -41,7 +41,7 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
         legs = [Evidence(replace(leg, tolerance=solution.tolerance), least) for leg in solution.legs]
         undefined = next((found for leg in legs if (found := leg.undefined())), "")
         if undefined:
-            return Report((Check("legs", np.inf, 0.0, "-", False, f"not a finite number: {undefined}"),), 0.0)
+            return Report((not_finite("legs", undefined),), 0.0)
         held = any(leg.path.attitudes or leg.problem.links for leg in legs)
         checks = [
             _worst(mission, legs, check)
@@ -52,6 +52,8 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
         checks += [whole.joints(), whole.optimality()]
         if solution.impulses:
             checks.append(primer_check(solution))
+        checks += [_worst(mission, legs, check) for _, check in own]
+    refuse_twins(checks)
     return Report(tuple(checks), time.perf_counter() - begun)
 
 

@@ -6,10 +6,14 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.basics.plain import unbroken
+from dmoc.basics.quaternions import in_one_sign, normalised
+from dmoc.configurations.base import Configuration
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.legs.legs import both_ends
@@ -139,7 +143,7 @@ def _known(mission: Mission, begins: np.ndarray) -> list[tuple[int, Any]]:
                 where = event.condition.with_dimension(mission.dimension)
                 place = where.estimate(float(begins[i]))[0]
                 if not np.isnan(place).any():
-                    known.append((i, State(tuple(place), None)))
+                    known.append((i, where if where.turns_body else State(tuple(place), None)))
                     break
     return known
 
@@ -161,7 +165,9 @@ def _leg(
 ) -> DiscretePath:
     mesh, order, hold = numerics
     fractions = node_fractions(mesh, scheme(order))
-    position = places(begin + duration * fractions)
+    position, body = places(begin + duration * fractions), configuration_of(problem)
+    for at in body.coordinates.quaternions:
+        position[:, at] = in_one_sign(normalised(position[:, at]))
     slopes = np.gradient(position, duration * fractions, axis=0)
     masses, control = np.full(len(fractions), mass), np.zeros((len(fractions), problem.controls))
     limit = problem.actuator.force_limit()
@@ -177,7 +183,17 @@ def _leg(
     if hold:
         rule = scheme(order)
         control = np.einsum("j,jkn->kn", rule.weights, control[step_nodes(len(mesh) - 1, rule)])
-    return DiscretePath(mesh, order, hold, duration, position, control, masses, slopes[0], slopes[-1])
+    first, last = (_independent(body, position[at], slopes[at]) for at in (0, -1))
+    made_of = body.coordinates if body.surplus else None
+    return DiscretePath(mesh, order, hold, duration, position, control, masses, first, last, made_of=made_of)
+
+
+def _independent(body: Configuration, place: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Independent velocities of a body whose coordinates change by a slope."""
+    if not body.surplus:
+        return slope
+    tangent = np.array(ca.DM(ca.evalf(ca.SX(body.tangent(ca.SX(ca.DM(place)))))))
+    return np.linalg.lstsq(tangent, slope, rcond=None)[0]
 
 
 def _own(mission: Mission, joint: Any, legs: list[DiscretePath]) -> np.ndarray | None:

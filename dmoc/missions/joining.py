@@ -9,66 +9,73 @@ momentum, so that the legs may have other Lagrangians or count in other frames.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.configurations.base import Configuration
-from dmoc.legs.events import Instant, condition_rows
+from dmoc.ends.base import Boundary
+from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint, both_ends
 from dmoc.missions.path import MissionPath
+from dmoc.missions.within import Placed
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.lobatto import scheme
-from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
-from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
-from dmoc.nlp.stencils import stencils_of
-from dmoc.nlp.units import Units
-from dmoc.parts.rows import Row, snake
+from dmoc.parts.rows import Row, snake, values_of, with_symbols
 from dmoc.scene.mission import Mission
-from dmoc.scene.problem import TransferProblem
 
+# The rows that belong to no joint are in the group of this name.
+WHOLE = "mission"
 # The size of an impulse is rounded at zero over this part of the unit of speed [-].
 ROUNDED = 1e-8
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A leg's program, and where its unknowns and rows begin in those of the mission."""
+class Given:
+    """Symbols for the numbers that change without a rebuild: parameters of legs, then of both ends."""
 
-    program: Program
-    columns: int
-    rows: int
-    parameters: int
+    def __init__(self, mission: Mission, legs: Sequence[Placed], count: int):
+        self.legs, self.of_legs, self._symbols = legs, ca.SX.sym("p", count), []
+        self.ends: dict[str, tuple[Any, ca.SX]] = {}
+        for name, end in (("start", mission.start), ("goal", mission.goal)):
+            fixed = ca.SX.sym(f"{name}.fixed", len(np.concatenate(end.fixed())))
+            twin, symbols = with_symbols(end, name)
+            self.ends[name] = twin, fixed
+            self._symbols += [fixed, *symbols]
 
-    def at(self, group: str, place: int) -> np.ndarray:
-        """Unknowns of the mission that are one entry of a group of this leg."""
-        return self.columns + self.program.columns[group].indices[:, place]
+    @property
+    def parameters(self) -> ca.SX:
+        """All of them, as `end_parameters` goes on behind the parameters of the legs."""
+        return ca.vertcat(self.of_legs, *self._symbols)
+
+    @property
+    def mass(self) -> ca.SX:
+        """Mass at the start [kg]."""
+        return self._number(0, 1)
+
+    def duration(self, index: int) -> ca.SX:
+        """Duration of a leg in which that is fixed [s]."""
+        return self._number(index, 2)
+
+    def _number(self, index: int, place: int) -> ca.SX:
+        """The parameter of a leg in this place behind its origin."""
+        leg = self.legs[index]
+        return self.of_legs[leg.parameters + len(leg.program.units.origin) + place]
+
+    def conditions(self, name: str, end: Boundary, here: Instant) -> list[Row]:
+        """The conditions of the start or the goal on a state."""
+        twin, fixed = self.ends[name]
+        return _named(name, [*fixed_rows(end, here, fixed), *twin.rows(*here)])
 
 
-def leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
-    """A leg without its sparse derivatives, its blocks, and how many parameters they have."""
-    rule = scheme(path.order)
-    stencils = stencils_of(problem, path.order, path.hold, joined=True)
-    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
-    none: Any = None
-    program = Program(
-        problem,
-        Dynamics.of(problem),
-        rule,
-        path.hold,
-        path.mesh,
-        units,
-        placed.columns,
-        placed.rows,
-        placed.row_bounds,
-        none,
-    )
-    return program, placed.blocks, stencils.parameter_count
+def end_parameters(mission: Mission) -> np.ndarray:
+    """The numbers of both ends: fixed entries, 0 where they are free, then those of their conditions."""
+    parts = [
+        (np.nan_to_num(np.concatenate(end.fixed())), values_of(end)) for end in (mission.start, mission.goal)
+    ]
+    return np.concatenate([part for pair in parts for part in pair])
 
 
 class JointWriter:
@@ -80,9 +87,10 @@ class JointWriter:
         joint: Joint,
         legs: Sequence[Placed],
         own: tuple[Layout, int],
+        given: Given,
         rounding: float | None = None,
     ):
-        self.mission, self.joint, self.legs = mission, joint, legs
+        self.mission, self.joint, self.legs, self.given = mission, joint, legs, given
         self.own, self.first = own
         self.rounding = ROUNDED if rounding is None else rounding
         self._symbols: list[ca.SX] = []
@@ -121,7 +129,7 @@ class JointWriter:
         leg = self.legs[index]
         if "duration" in leg.program.columns:
             return self.take(leg.at("duration", 0), "T")
-        return leg.program.problem.duration_bounds[0]
+        return self.given.duration(index)
 
     def before(self) -> Instant:
         """The state before the events."""
@@ -134,7 +142,7 @@ class JointWriter:
             return behind
         speeds = self.take_own("velocity")
         assert speeds.numel() == body.freedom
-        return Instant(behind.t, behind.q, speeds, ca.SX(float(self.mission.mass)))
+        return Instant(behind.t, behind.q, speeds, self.given.mass)
 
     def write(self) -> None:
         """All rows and the cost of the joint."""
@@ -142,7 +150,7 @@ class JointWriter:
         self._behind = None if joint.right is None else self.state(joint.right, last=False)
         here = self.before()
         if joint.left is None and joint.boundary is not None:
-            self.rows += _named("start", condition_rows(joint.boundary, here))
+            self.rows += self.given.conditions("start", joint.boundary, here)
         units = self.beside.program.units
         tiny = self.rounding * units.length / units.time
         for i, event in enumerate(joint.events):
@@ -154,7 +162,7 @@ class JointWriter:
             here = passed.after
         if joint.right is None:
             if joint.boundary is not None:
-                self.rows += _named("goal", condition_rows(joint.boundary, here))
+                self.rows += self.given.conditions("goal", joint.boundary, here)
             body = self.beside.program.dynamics.configuration
             seen = body.body(here.q, body.velocity(here.q, here.v))
             self._pay(self.mission.objective.terminal(here.t, seen.position, seen.velocity, here.m))
@@ -178,7 +186,8 @@ class JointWriter:
         targets = first_row + rows[self.joint.name].indices if self.rows else np.empty((0, 1), int)
         places, symbols = _merged(self._places, self._symbols)
         expressions = [row.expression for row in self.rows]
-        made = kernel("joint", symbols, ca.SX(0, 1), ca.SX(0, 1), ca.vertcat(*expressions), ca.SX(self.cost))
+        given = ca.SX(0, 1), self.given.parameters
+        made = kernel("joint", symbols, *given, ca.vertcat(*expressions), ca.SX(self.cost))
         return Block(made, places[:, None], targets, np.empty((0, 1)))
 
 
@@ -213,12 +222,39 @@ def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
     return layout
 
 
-def row_to_drop(path: MissionPath) -> int:
-    """Which velocity is not asked for again at the end of a closed path: the largest at its start."""
-    return int(np.argmax(np.abs(path.legs[0].start_velocity)))
+def row_to_drop(mission: Mission, legs: Sequence[Placed], path: MissionPath) -> int:
+    """Which velocity is not asked for again at the end of a closed path: the largest at its start, or none, -1.
+
+    Where nothing does work the energy gives one of them, and a row for it would depend on the others.
+    """
+    still = all(event.keeps_energy for joint in mission.joints for event in joint.events)
+    kept = still and all(_keeps_energy(leg.program.dynamics) for leg in legs)
+    return int(np.argmax(np.abs(path.legs[0].start_velocity))) if kept else -1
 
 
-def whole_rows(mission: Mission, legs: Sequence[Placed], drop: int) -> tuple[list[Row], np.ndarray, ca.SX]:
+def _keeps_energy(dynamics: Dynamics) -> bool:
+    """Whether a leg has no controls, and no effect that does work or changes with time."""
+    push = ca.SX(dynamics.point(*dynamics.symbols())[2])
+    return not dynamics.controls and not dynamics.depends_on_time and push.is_zero()
+
+
+def spans_of(mission: Mission, legs: int) -> list[tuple[int, int, Any]]:
+    """The first and the last leg of each duration that is asked of several of them, and that duration [s]."""
+    whole = [] if mission.duration is None else [(0, legs - 1, mission.duration)]
+    return [*mission.sums, *whole]
+
+
+def put_spans(mission: Mission, legs: int, rows: Layout, sides: Sequence[np.ndarray]) -> None:
+    """Put those durations among the lower and upper bounds of the rows of joints, which `sides` are, scaled."""
+    for i, (_, _, span) in enumerate(spans_of(mission, legs)):
+        group = rows[WHOLE]
+        for side, end in zip(sides, both_ends(span), strict=True):
+            side[group.start + i] = end * group.scales[0, i]
+
+
+def whole_rows(
+    mission: Mission, legs: Sequence[Placed], drop: int, given: Given
+) -> tuple[list[Row], np.ndarray, ca.SX]:
     """Rows of the mission as a whole: its duration, and that its path closes."""
     pool: dict[tuple[int, ...], ca.SX] = {}
 
@@ -227,15 +263,12 @@ def whole_rows(mission: Mission, legs: Sequence[Placed], drop: int) -> tuple[lis
 
     first, last = legs[0], legs[-1]
     rows: list[Row] = []
-    spans = list(mission.sums)
-    if mission.duration is not None:
-        spans.append((0, len(legs) - 1, mission.duration))
-    for begin, end, span in spans:
+    for begin, end, span in spans_of(mission, len(legs)):
         total = ca.SX(0)
         if begin < end:
             total = take(legs[end].at(LEG_START, 0)) - take(legs[begin].at(LEG_START, 0))
         free = "duration" in legs[end].program.columns
-        lasts = take(legs[end].at("duration", 0)) if free else legs[end].program.problem.duration_bounds[0]
+        lasts = take(legs[end].at("duration", 0)) if free else given.duration(end)
         rows.append(Row("duration", total + lasts, *both_ends(span), "s"))
     if mission.closes:
         begin = take(first.at("position", 0)) + first.program.units.origin

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import casadi as ca
 import numpy as np
 
 from dmoc.legs.legs import Joint
-from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 
-# A cut so near to a step end, as a part of the steps beside it, is made there [-].
-SNAP = 0.2
 # About this part of the cost at a goal is decided by the way there [-]: in units of all of it a launcher takes
 # 218 iterations, in units of this part 24.
 DECIDED = 0.01
@@ -45,6 +43,13 @@ class MissionPath:
     forces: dict[str, np.ndarray] = field(default_factory=dict)
     near: bool = False
     idle: tuple[str, ...] = ()
+
+    def as_one(self, controls: int) -> DiscretePath:
+        """The path of all legs as that of a transfer with so many controls, without multipliers."""
+        order = max(leg.order for leg in self.legs)
+        parts = [leg.onto(leg.mesh, order, False) for leg in self.legs]
+        parts = [part if part.control.shape[1] == controls else coasting(part, controls) for part in parts]
+        return reduce(merged, parts)
 
     def without_idle(self, mission: Mission, nothing: float) -> MissionPath:
         """The same with impulses below a speed [m/s] as none, but for the last one."""
@@ -147,39 +152,6 @@ def joint_cost(mission: Mission, path: MissionPath) -> float:
     return total + DECIDED * abs(float(end))
 
 
-def cut(path: DiscretePath, fraction: float) -> tuple[DiscretePath, DiscretePath]:
-    """A path in two parts, without multipliers; the cut is a step end of both."""
-    steps, rule = np.diff(path.mesh), scheme(path.order)
-    near = int(np.argmin(np.abs(path.mesh - fraction)))
-    if 0 < near < len(steps) and abs(path.mesh[near] - fraction) < SNAP * steps[near - 1 : near + 1].min():
-        fraction = float(path.mesh[near])
-    mesh = np.unique(np.append(path.mesh, fraction))
-    fine, k = path.onto(mesh, path.order, path.hold), int(np.searchsorted(mesh, fraction))
-    node, control = k * rule.degree, k if path.hold else k * rule.degree
-    slopes = np.gradient(fine.position, fine.duration * fine.fractions, axis=0)[node]
-    first = replace(
-        fine,
-        mesh=mesh[: k + 1] / fraction,
-        duration=fraction * path.duration,
-        position=fine.position[: node + 1],
-        control=fine.control[: control + (not path.hold)],
-        mass=fine.mass[: node + 1],
-        goal_velocity=slopes,
-        multipliers={},
-    )
-    last = replace(
-        fine,
-        mesh=(mesh[k:] - fraction) / (1 - fraction),
-        duration=(1 - fraction) * path.duration,
-        position=fine.position[node:],
-        control=fine.control[control:],
-        mass=fine.mass[node:],
-        start_velocity=slopes,
-        multipliers={},
-    )
-    return first, last
-
-
 def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
     """Two paths of one order, one after the other, as one without multipliers."""
     total = first.duration + last.duration
@@ -194,6 +166,11 @@ def merged(first: DiscretePath, last: DiscretePath) -> DiscretePath:
         goal_velocity=last.goal_velocity,
         multipliers={},
     )
+
+
+def coasting(path: DiscretePath, controls: int) -> DiscretePath:
+    """A path with so many controls, none of which pushes."""
+    return replace(path, control=np.zeros((len(path.control), controls)))
 
 
 def cold(path: MissionPath) -> MissionPath:

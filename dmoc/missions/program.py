@@ -10,9 +10,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.joining import JointWriter, Placed, leg_program, own_unknowns, row_to_drop, whole_rows
+from dmoc.missions.joining import (
+    WHOLE,
+    Given,
+    JointWriter,
+    end_parameters,
+    own_unknowns,
+    put_spans,
+    row_to_drop,
+    whole_rows,
+)
 from dmoc.missions.path import MissionPath, joint_cost
-from dmoc.missions.within import open_leg, polynomial_block, polynomial_rows
+from dmoc.missions.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
 from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
 from dmoc.nlp.ipopt_options import NEAR, rounding, settings_for
@@ -22,8 +31,6 @@ from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
-# The rows that belong to no joint are in the group of this name.
-WHOLE = "mission"
 # The barrier parameter and the distances from limits begin with this where a path is nearly an answer [-].
 CLOSE = 1e-6
 
@@ -67,18 +74,18 @@ class MissionProgram:
             blocks += [block.moved(*map(int, at)) for block in mine]
             at += (program.columns.size, program.rows.size, parameters)
         columns, first_row, leg_blocks = int(at[0]), int(at[1]), len(blocks)
-        own, rows, writers = {}, Layout(), []
+        own, rows, writers, given = {}, Layout(), [], Given(mission, legs, int(at[2]))
         bounds: list[tuple[np.ndarray, np.ndarray]] = []
         for joint in mission.joints:
             beside = legs[joint.right if joint.left is None else joint.left].program  # type: ignore[index]
             layout = own_unknowns(joint, beside, mission.mass)
             own[joint.name] = (layout, columns)
-            writer = JointWriter(mission, joint, legs, own[joint.name], rounding)
+            writer = JointWriter(mission, joint, legs, own[joint.name], given, rounding)
             writer.write()
             columns += layout.size
             rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
-        whole, places, expressions = whole_rows(mission, legs, row_to_drop(path))
+        whole, places, expressions = whole_rows(mission, legs, row_to_drop(mission, legs, path), given)
         rows = _add(
             rows, WHOLE, whole, max((leg.program.units for leg in legs), key=attrgetter("time")), bounds
         )
@@ -88,10 +95,8 @@ class MissionProgram:
             if writer.rows or not ca.SX(writer.cost).is_zero()
         ]
         if whole:
-            none = ca.SX(0, 1)
-            made = kernel(
-                "mission", expressions, none, none, ca.vertcat(*[r.expression for r in whole]), ca.SX(0)
-            )
+            symbols = expressions, ca.SX(0, 1), given.parameters
+            made = kernel("mission", *symbols, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         for placed, plan, name in zip(legs, mission.plan, mission.leg_names, strict=True):
             smooth, controls, weights = polynomial_rows(placed, plan)
@@ -115,9 +120,9 @@ class MissionProgram:
     @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of unknowns, rows and parameters."""
-        last, parameters = self.legs[-1], self.legs[-1].parameters
+        last = self.legs[-1]
         columns = last.columns + last.program.columns.size + sum(layout.size for layout, _ in self.own.values())
-        return columns, self.first_row + self.rows.size, parameters + len(self._parameters_of(-1))
+        return columns, self.first_row + self.rows.size, len(self.parameters())
 
     @property
     def numerics(self) -> tuple[int, int]:
@@ -139,13 +144,10 @@ class MissionProgram:
         scales = self.column_scales(), self.row_scales(), 1 / self.cost
         return assemble(self.blocks, *scales, self.sizes[2], compiled)
 
-    def _parameters_of(self, index: int) -> np.ndarray:
-        program = self.legs[index].program
-        return program.parameters(program.problem)
-
     def parameters(self) -> np.ndarray:
-        """The parameters of all legs [SI]."""
-        return np.concatenate([self._parameters_of(i) for i in range(len(self.legs))])
+        """The parameters of all legs, then of both ends [SI]."""
+        each = [leg.program.parameters(leg.program.problem) for leg in self.legs]
+        return np.concatenate([*each, end_parameters(self.mission)])
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""
@@ -157,11 +159,13 @@ class MissionProgram:
         for place in self.idle_places():
             free[place - first] = 0.0
         lower, upper, low, high = (list(side) for side in zip(*parts, strict=True))
+        joined = [side.copy() for side in self.row_bounds]
+        put_spans(self.mission, len(self.legs), self.rows, joined)
         return (
             np.concatenate([*lower, -free]),
             np.concatenate([*upper, free]),
-            np.concatenate([*low, self.row_bounds[0]]),
-            np.concatenate([*high, self.row_bounds[1]]),
+            np.concatenate([*low, joined[0]]),
+            np.concatenate([*high, joined[1]]),
         )
 
     def idle_places(self) -> list[int]:

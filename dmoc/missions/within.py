@@ -2,18 +2,61 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
 from dmoc.legs.legs import Leg
-from dmoc.missions.joining import Placed
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
+from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Block, kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START
+from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A leg's program, and where its unknowns and rows begin in those of the mission."""
+
+    program: Program
+    columns: int
+    rows: int
+    parameters: int
+
+    def at(self, group: str, place: int) -> np.ndarray:
+        """Unknowns of the mission that are one entry of a group of this leg."""
+        return self.columns + self.program.columns[group].indices[:, place]
+
+
+def leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
+    """A leg without its sparse derivatives, its blocks, and how many parameters they have."""
+    rule = scheme(path.order)
+    stencils = stencils_of(problem, path.order, path.hold, joined=True)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
+    none: Any = None
+    program = Program(
+        problem,
+        Dynamics.of(problem),
+        rule,
+        path.hold,
+        path.mesh,
+        units,
+        placed.columns,
+        placed.rows,
+        placed.row_bounds,
+        none,
+    )
+    return program, placed.blocks, stencils.parameter_count
 
 
 def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list[np.ndarray]) -> None:
@@ -28,7 +71,8 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
     burns = "mass" in columns
     place = columns["mass" if burns else LEG_MASS].start
     scale = program.units.mass
-    least = max(actuator.dry_mass if burns else 0.0, 1e-6 * mission.mass)
+    # The exported solver finds by large numbers how a bound depends on one: this depends on the dry mass alone.
+    least = (actuator.dry_mass if burns else 0.0) or 1e-6 * scale
     lower[place], upper[place] = least / scale, np.inf
     if given:
         lower[place] = upper[place] = mission.mass / scale

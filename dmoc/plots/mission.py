@@ -76,7 +76,7 @@ def _joint_times(solution: MissionSolution) -> list[float]:
     return [leg.provenance.start_time for leg in solution.legs[1:]]
 
 
-def _scenery(solution: MissionSolution) -> Any:
+def scenery(solution: MissionSolution) -> Any:
     """What lies around the path: the effects and constraints of all legs, each once, as of one transfer."""
     around: Any = None
     if solution.problem is not None:
@@ -143,14 +143,14 @@ def _kicks(solution: MissionSolution) -> tuple[np.ndarray, np.ndarray, float]:
 
 def _view(solution: MissionSolution) -> Any:
     drawn = [tails + arrows for tails, arrows, _ in (_forces(solution)[0], _kicks(solution))]
-    return view_of(_scenery(solution), np.concatenate([solution.position, *drawn]))
+    return view_of(scenery(solution), np.concatenate([solution.position, *drawn]))
 
 
 def _draw_path(axes: Any, solution: MissionSolution, view: Any, beside: bool) -> None:
     """The path of each leg with joints, forces, impulses and what lies around it."""
     size, unit = scale_of(solution.position, *view)
     view = view[0] / size, view[1] / size
-    proxies = draw_scene(axes, _scenery(solution), view, size)
+    proxies = draw_scene(axes, scenery(solution), view, size)
     curves = [within_steps(leg, leg.position)[1] / size for leg in solution.legs]
     for leg, look, curve in zip(solution.legs, looks_of(solution.legs), curves, strict=True):
         mark_burns(axes, leg, leg.position.T / size)

@@ -170,7 +170,7 @@ class Mission:
         """Each leg as a transfer between two joints, whose states and masses are open."""
         ends = Loose.like(self._whole.start)
         return tuple(
-            self._of_leg(leg, ends, ends, Share(self.objective), self._span_of(leg), name)
+            self._of_leg(leg, ends, ends, Share(self.objective), self.duration_of(leg), name)
             for leg, name in zip(self.plan, self.leg_names, strict=True)
         )
 
@@ -201,7 +201,7 @@ class Mission:
         own = leg.order, leg.steps, leg.name or None
         if len(self.legs) > 1 or self.closes or own != (None, None, None) or isinstance(self.start_time, tuple):
             return None
-        span = self._span_of(leg) if self.duration is None else self.duration
+        span = self.duration_of(leg) if self.duration is None else self.duration
         whole = self._of_leg(leg, self.start, self.goal, self.objective, span, self.name)
         return replace(whole, guess=self.guess, parameters=self.parameters)
 
@@ -209,8 +209,8 @@ class Mission:
     def _whole(self) -> TransferProblem:
         """The mission as one transfer by its first leg: it checks the parts and completes the ends."""
         goal = Loose.like(self.start) if self.closes else self.goal
-        longest = sum(both_ends(self._span_of(leg))[1] for leg in self.plan)
-        shortest = sum(both_ends(self._span_of(leg))[0] for leg in self.plan)
+        longest = sum(both_ends(self.duration_of(leg))[1] for leg in self.plan)
+        shortest = sum(both_ends(self.duration_of(leg))[0] for leg in self.plan)
         span = shortest if shortest == longest else (shortest, longest)
         share = Share(self.objective)
         return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])
@@ -227,7 +227,8 @@ class Mission:
         whole = self._whole
         checked(self, start=whole.start, goal=self.goal if self.closes else whole.goal)
 
-    def _span_of(self, leg: Leg) -> Any:
+    def duration_of(self, leg: Leg) -> Any:
+        """What the duration of a leg may be [s], a number or (shortest, longest)."""
         if leg.duration is not None:
             return leg.duration
         if self.duration is None:
@@ -242,7 +243,7 @@ class Mission:
         """Legs must fit into the duration of the mission."""
         spans = []
         for leg, name in zip(self.plan, self.leg_names, strict=True):
-            spans.append(both_ends(span_of(f"duration of {name}", self._span_of(leg))))
+            spans.append(both_ends(span_of(f"duration of {name}", self.duration_of(leg))))
         if self.duration is None:
             return
         shortest, longest = both_ends(self.duration)

@@ -27,11 +27,9 @@ if TYPE_CHECKING:
 
 # A problem file defines a function of this name, which makes the problem.
 FUNCTION = "problem"
-# The module of a problem file is named by this and the file's own name: by it a line of a user's file is
-# recognised in a traceback.
+# The module of a problem file is named by this and the file's own name, which tracebacks are searched for.
 MODULE = "dmoc_problem_"
-# A line of a user's file and the message of its error are each cut off after this many letters: both should fit
-# on a few lines of a terminal.
+# A line of a user's file and the message of its error are each cut off after this many letters.
 MOST_QUOTED = 160
 
 
@@ -96,8 +94,10 @@ class ProblemFile:
 
 
 def folders() -> list[Path]:
-    """Where names are looked for: `./problems`, then `problems` beside the package."""
-    return [Path("problems"), Path(__file__).resolve().parents[2] / "problems"]
+    """Where names are looked for: `./problems`, then inside the package, or beside it in a checkout."""
+    package = Path(__file__).resolve().parents[1]
+    inside = package / "problems"
+    return [Path("problems"), inside if inside.is_dir() else package.parent / "problems"]
 
 
 def catalogue() -> list[tuple[str, str]]:

@@ -24,6 +24,27 @@ if TYPE_CHECKING:
 
 # A file of a mission says that it has this format.
 MISSION = "dmoc mission"
+# Below this tolerance [-] structure pays by itself: steps cut at switches reach it in seconds, and hardly more.
+TIGHT = 1e-5
+
+
+@overload
+def solve(
+    problem: TransferProblem,
+    order: int | None = ...,
+    steps: int | None = ...,
+    tol: None = ...,
+    hold: bool = ...,
+    mesh: Any = ...,
+    guess: Any = ...,
+    options: dict[str, Any] | None = ...,
+    progress: Progress | None = ...,
+    compiled: bool = ...,
+    time_limit: float | None = ...,
+    *,
+    structure: Literal[False] | None = ...,
+    impulses: None = ...,
+) -> Solution: ...
 
 
 @overload
@@ -40,7 +61,7 @@ def solve(
     compiled: bool = ...,
     time_limit: float | None = ...,
     *,
-    structure: Literal[False] = ...,
+    structure: Literal[False],
     impulses: None = ...,
 ) -> Solution: ...
 
@@ -59,7 +80,7 @@ def solve(
     compiled: bool = ...,
     time_limit: float | None = ...,
     *,
-    structure: bool = ...,
+    structure: bool | None = ...,
     impulses: str | None = ...,
 ) -> Any: ...
 
@@ -77,7 +98,7 @@ def solve(
     compiled: bool = False,
     time_limit: float | None = None,
     *,
-    structure: bool = False,
+    structure: bool | None = None,
     impulses: str | None = None,
 ) -> Any:
     """Solve a transfer problem or a mission, coarse to fine.
@@ -86,7 +107,8 @@ def solve(
     zones and ways along limits of a coarse answer become the legs of a mission with free ends, in each of which
     nothing switches, so that the full order of the scheme is had. `order` and `steps` are then those of the
     coarse answer. The answer is a MissionSolution; where that does not succeed, or there is one arc alone, it
-    is as without.
+    is as without. Where a tolerance below 1e-5 is all that is asked for, and an engine or a zone may switch,
+    this is tried by itself; not with `structure=False`.
 
     Parameters
     ----------
@@ -122,7 +144,7 @@ def solve(
         Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
         solved: its status is then "time limit", and it is no success.
 
-    structure : bool
+    structure : bool, optional
         Of a transfer, as above.
     impulses : "auto", optional
         Of a mission with impulses: as many as the primer vector asks for, none that is zero.
@@ -145,6 +167,8 @@ def solve(
         if impulses is not None:
             raise ValueError("impulses are those of a dmoc.Mission; a transfer has none")
         found = None
+        if structure is None:
+            structure = _pays(stated, (order, steps, mesh), tol, hold)
         if structure:
             found = _by_structure(stated, order, steps, tol, hold, mesh, guess, rest)
         return found or transfer_solver.solve(stated, order, steps, tol, hold, mesh, guess, *rest)
@@ -159,6 +183,15 @@ def solve(
         return solve_mission(mission, order, steps, tol, hold, None, path, *rest)
 
     return with_best_impulses(answer, again)
+
+
+def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
+    """Whether structure is tried without being asked for."""
+    if hold or chosen != (None, None, None) or not (isinstance(tol, float) and 0 < tol < TIGHT):
+        return False
+    from dmoc.structure.solve import has_switches
+
+    return has_switches(problem)
 
 
 def _by_structure(

@@ -14,10 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from dmoc.missions.checks import HELPS, worth_of
-from dmoc.missions.path import MissionPath, cut, merged
+from dmoc.missions.path import MissionPath, merged
 from dmoc.missions.solution import MissionSolution
 from dmoc.scene.impulses import FEWER, MORE, with_impulse, without_impulse
 from dmoc.scene.mission import Mission
+from dmoc.structure.pieces import cut
 from dmoc.structure.solution import changed_solution
 
 # There are no more than so many impulses.

@@ -101,6 +101,11 @@ def can_be_parted(problem: TransferProblem) -> bool:
     )
 
 
+def has_switches(problem: TransferProblem) -> bool:
+    """Whether an answer may have more than one arc: of full thrust and none, or with and without contacts."""
+    return (bool(problem.constraints) or is_switched(problem)) and can_be_parted(problem)
+
+
 def coarse_answer(problem: TransferProblem, order: int | None, steps: int | None, **more: Any) -> Solution:
     """An answer that is good enough to see the arcs in."""
     engine: Any = problem.actuator

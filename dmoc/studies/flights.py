@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 @wraps(march.simulate)
 def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Trajectory:
     problem = getattr(problem, "alone", None) or problem
+    if hasattr(controls, "legs") and not hasattr(problem, "joints"):
+        # The arcs of a transfer that was solved by its structure are the legs of a mission.
+        problem = controls.attach(problem).require_problem()
     if not hasattr(problem, "joints"):
         return march.simulate(problem, controls, *given, **more)
     return flown_mission(problem, controls)

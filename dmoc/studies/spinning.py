@@ -115,12 +115,15 @@ def spin(
     ]
 
 
-def _run(problem: TransferProblem, name: str, h: float, steps: int) -> Spinning:
+def marched(
+    problem: TransferProblem, name: str, h: float, steps: int
+) -> tuple[Dynamics, np.ndarray, np.ndarray, np.ndarray, float]:
+    """Dynamics, coordinates, momenta per mass, velocities, and the seconds that so many steps took."""
     dynamics = Dynamics.of(problem)
-    attitude, rate = problem.start.fixed()
+    begin, rate = problem.start.fixed()
     canonical = name.startswith("order ")
-    momentum = partial(_over, dynamics.momentum, problem.mass)
-    start = np.concatenate([attitude, momentum(attitude[None], rate[None])[0] if canonical else rate])
+    momentum = partial(over_states, dynamics.momentum, problem.mass)
+    start = np.concatenate([begin, momentum(begin[None], rate[None])[0] if canonical else rate])
     step = step_function(name, dynamics, problem)
     march = step.mapaccum("march", min(PIECE, steps), {"base": 4})
     states, begun = [start[:, None]], time.perf_counter()
@@ -131,22 +134,31 @@ def _run(problem: TransferProblem, name: str, h: float, steps: int) -> Spinning:
         states.append(piece(states[-1][:, -1], times[None], h).full())
     spent = time.perf_counter() - begun
     found = np.hstack(states).T
-    q, second = found[:, :4], found[:, 4:]
+    q, second = found[:, : len(begin)], found[:, len(begin) :]
     spins = second if canonical else momentum(q, second)
-    rates = _over(dynamics.velocity, problem.mass, q, second) if canonical else second
-    energy = _over(dynamics.energy, problem.mass, q, rates)[:, 0]
+    rates = over_states(dynamics.velocity, problem.mass, q, second) if canonical else second
+    return dynamics, q, spins, rates, spent
+
+
+def growth_of(errors: np.ndarray) -> float:
+    """The largest of the last tenth of some errors over that of the first tenth."""
+    tenth = max(len(errors) // 10, 1)
+    early = errors[: tenth + 1].max()
+    return float(errors[-tenth:].max() / early) if early else np.nan
+
+
+def _run(problem: TransferProblem, name: str, h: float, steps: int) -> Spinning:
+    dynamics, q, spins, rates, spent = marched(problem, name, h, steps)
+    energy = over_states(dynamics.energy, problem.mass, q, rates)[:, 0]
     off = np.abs(energy - energy[0]) / (0.5 * float(spins[0] @ rates[0]))
-    tenth = max(len(off) // 10, 1)
     in_space = rotated(q, spins)
     # Under gravity along z, the angular momentum about z alone is kept.
     kept = in_space[:, 2:] if problem.effects else in_space
     turned = np.linalg.norm(kept - kept[0], axis=1).max() / np.linalg.norm(in_space[0])
-    early = off[: tenth + 1].max()
-    growth = float(off[-tenth:].max() / early) if early else np.nan
     norm = float(np.abs(np.sum(q * q, axis=1) - 1).max())
-    return Spinning(name, h, steps, norm, float(turned), float(off.max()), growth, spent)
+    return Spinning(name, h, steps, norm, float(turned), float(off.max()), growth_of(off), spent)
 
 
-def _over(function: ca.Function, mass: float, q: np.ndarray, other: np.ndarray) -> np.ndarray:
+def over_states(function: ca.Function, mass: float, q: np.ndarray, other: np.ndarray) -> np.ndarray:
     """A function (t, q, other, m) of all states, one row each."""
     return np.array(function(0.0, q.T, other.T, mass)).T.reshape(len(q), -1)

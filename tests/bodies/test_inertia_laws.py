@@ -28,8 +28,8 @@ from dmoc import (
 )
 from dmoc.basics.quaternions import angle_between, conjugate, rotated, times
 from dmoc.exports.export import functions_of
-from dmoc.exports.planner import Planner
 from dmoc.motion.lobatto import scheme
+from dmoc.planners.planner import Planner
 
 J, MASS, EXHAUST, TIME = np.array([1.0, 2.0, 2.8]), 2.0, 20.0, 4.0
 PLACES = np.array([(a, b, 0) for a in (0.5, -0.5) for b in (0.5, -0.5)] * 3)

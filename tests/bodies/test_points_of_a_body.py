@@ -30,7 +30,7 @@ from dmoc import (
     verify,
 )
 from dmoc.basics.quaternions import rotated, times
-from dmoc.exports.numbers import Numbers
+from dmoc.planners.numbers import Numbers
 from dmoc.plots.page import figure
 
 TIP, CENTER, RADIUS = (0.8, 0.0, 0.0), np.array([1.5, 0.95, 0.05]), 0.4
@@ -125,7 +125,7 @@ def test_other_limits_act_on_the_tip(limit, most):
 
 def test_a_point_has_numbers_that_may_change_without_a_rebuild(tmp_path):
     nlp = transcribe(rod(BALL), 30, 4)
-    known = {number.name for number in Numbers(nlp).kept}
+    known = {number.name for number in Numbers.of(nlp).kept}
     assert {"keep_out_1_center", "keep_out_1_radius", "keep_out_1_point"} <= known
     shorter = rod(KeepOut(CENTER, RADIUS, point=(0.6, 0, 0)))
     found = nlp.solve(shorter)

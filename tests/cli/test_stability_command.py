@@ -62,11 +62,12 @@ def test_the_verb_draws_prints_and_speaks_json(capfd, tmp_path):
         "two-step form",
         "stable up to",
         "2.829",
+        "double pendulum of rods",
     ):
         assert word in out
     code, out, err = run(capfd, *options, "--json")
     found = json.loads(out)
-    assert (code, err, list(found)) == (0, "", ["drift", "turning", "round_off", "unstable"])
+    assert (code, err, list(found)) == (0, "", ["drift", "turning", "swinging", "round_off", "unstable"])
     assert {row["method"] for row in found["drift"]} >= {"order 2", "RK4", "DOP853"}
     assert [row["steps"] for row in found["round_off"]] == [5000] * 3
 

@@ -27,7 +27,7 @@ from dmoc import (
     verify,
 )
 from dmoc.exports.export import functions_of
-from dmoc.exports.planner import Planner, nominal, solver
+from dmoc.planners.planner import Planner, nominal, solver
 
 INERTIA = (1.0, 2.0, 2.8)
 TURNED = rotation((1, 1, 1), 120)

@@ -10,7 +10,7 @@ from dmoc import Attitude, Pose, Thrusters, Torque, TransferProblem, Wrench, exp
 from dmoc.basics.compiled import compiler
 from dmoc.basics.quaternions import rotated, times, turned_by
 from dmoc.exports.export import functions_of
-from dmoc.exports.planner import Planner, nominal, solver
+from dmoc.planners.planner import Planner, nominal, solver
 
 INERTIA = np.diag([1.0, 2.0, 2.8])
 # Six pairs of thrusters around a cube; both of a pair push the same way.

@@ -34,9 +34,9 @@ from dmoc.cli.app import main
 from dmoc.exports import export as exporting
 from dmoc.exports.code import write_code
 from dmoc.exports.export import functions_of
-from dmoc.exports.functions import all_steps, one_step
-from dmoc.exports.planner import Planner
-from dmoc.exports.residual import residual
+from dmoc.planners.functions import all_steps, one_step
+from dmoc.planners.planner import Planner
+from dmoc.planners.residual import residual
 
 FLYER = TransferProblem(
     10.0,

@@ -8,7 +8,7 @@ import pytest
 
 from dmoc import LinearDrag, RotatingFrame, State, TransferProblem, UniformGravity, simulate, solve, verify
 from dmoc.exports.export import functions_of
-from dmoc.exports.planner import Planner
+from dmoc.planners.planner import Planner
 
 TURNING = TransferProblem(
     2.0,

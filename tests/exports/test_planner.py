@@ -31,7 +31,7 @@ from dmoc import (
     transcribe,
     verify,
 )
-from dmoc.exports.planner import Planner, nominal, solver
+from dmoc.planners.planner import Planner, nominal, solver
 
 STEPS = 20
 REST = State((0, 0), (0, 0))

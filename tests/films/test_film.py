@@ -87,6 +87,39 @@ def test_the_marker_of_a_body_is_where_the_body_is(tmp_path):
     assert places[1][0] > places[0][0] + 100
 
 
+def test_a_film_of_a_mission_shows_legs_joints_and_impulses_at_their_times(tmp_path):
+    solution = solve(load_problem("bielliptic").make())
+    scene = scene_of(solution, 41)
+    assert [trail.name for trail in scene.trails] == ["out", "back"]
+    assert len(scene.joints) == 1 and scene.joints[0] == pytest.approx(solution.legs[1].position[0])
+    # The body is where the path is at that time, in either leg.
+    for place, now in zip(scene.places[0], scene.times, strict=True):
+        trail = next(trail for trail in reversed(scene.trails) if trail.times[0] <= now)
+        assert place == pytest.approx([np.interp(now, trail.times, column) for column in trail.points.T])
+    assert [late for late, _ in scene.kicks] == pytest.approx([kick.time for kick in solution.impulses])
+    for (_, arrow), kick in zip(scene.kicks, solution.impulses, strict=True):
+        way = (arrow[1] - arrow[0]) / np.linalg.norm(arrow[1] - arrow[0])
+        assert arrow[0] == pytest.approx(kick.position) and way == pytest.approx(kick.change / kick.size)
+    path = tmp_path / "flight.gif"
+    animate(solution, path, frames=3)
+    film, dark = Image.open(path), []
+    for frame in range(3):
+        film.seek(frame)
+        image = np.asarray(film.convert("RGB").crop((90, 60, 620, 400)), int)
+        dark.append(int((image.max(axis=2) < 60).sum()))
+    # Each impulse leaves its arrow: one at the start, then two, and the last one at the goal.
+    assert dark[0] + 40 < dark[1] and dark[1] + 40 < dark[2]
+
+
+def test_forces_of_a_mission_that_loses_mass_are_shown_per_mass():
+    solution = solve(load_problem("delta_iii").make())
+    scene = scene_of(solution, 30)
+    assert scene.push_words == "force per mass" and len(scene.pushes) == 1
+    lengths = np.linalg.norm(scene.pushes[0][:, 1] - scene.pushes[0][:, 0], axis=1)
+    # The last stage pushes with a fortieth of the force of the first, but not of its force per mass.
+    assert lengths[-1] > 0.2 * lengths.max()
+
+
 @pytest.mark.slow
 def test_thrusters_of_a_body_of_a_system_fire_against_their_force():
     places, ways = [(0.3, 0.2, 0), (-0.3, -0.2, 0)], [(0, 0, 1), (0, 0, 1)]

@@ -402,6 +402,7 @@ def spinning(steps):
     return found
 
 
+@pytest.mark.slow
 def test_the_checks_see_bodies_that_spin_about_all_axes():
     found = spinning(40)
     assert not failed(found)
@@ -447,6 +448,7 @@ def test_a_joint_stops_at_its_stop():
     assert "JointLimit" in verify(through)["bounds"].note
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_too_weak_is_named_by_its_joint():
     weak = arm(actuator=[JointTorque(SHOULDER, 0.05), JointTorque(ELBOW)])
     found = solve(weak, order=2, steps=40)
@@ -595,6 +597,7 @@ def test_result_files_tell_the_unit_of_each_constraint_force(tmp_path):
     assert list(configuration_of(problem).link_units) == [("m", "m", "m", "rad", "rad")] * 2
 
 
+@pytest.mark.slow
 def test_starts_bring_a_joint_to_its_goal_the_other_way_round():
     """The arm of a free-flyer reaches for less where its forearm comes by the other side."""
     problem = load_problem("arm_in_space").make()

@@ -321,6 +321,7 @@ def test_a_leap_through_the_anchor_is_seen():
     assert failing["stability"].unit == "degrees a node"
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_too_weak_is_named_and_what_is_needed_is_enough():
     weak = arm(actuator=[JointTorque(UPPER, 0.5), JointTorque(LOWER, 0.5, UPPER)])
     found = solve(weak, order=2, steps=40)

@@ -1,5 +1,7 @@
 """A hundred thousand steps of a double pendulum and of a free chain, beside Runge-Kutta's method."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -20,6 +22,8 @@ from dmoc import (
 from dmoc.basics.quaternions import rotated
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
+from dmoc.studies.drift import kepler
+from dmoc.studies.swinging import LENGTHS, double_pendulum, swing
 
 STEPS, STEP = 100_000, 0.05
 
@@ -52,6 +56,20 @@ def runge_kutta(problem, steps):
     step = ca.Function("step", [y], [y + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
     start = np.concatenate(problem.start.fixed())
     return step.mapaccum("march", steps, {"base": 4})(start).full().T[:, : q.numel()]
+
+
+def test_schemes_keep_rods_and_energy_where_runge_kutta_lets_both_go():
+    methods = {name: LENGTHS[name] for name in ("order 2", "order 4", "RK4")}
+    rows = {row.method: row for row in swing(double_pendulum(), 1000, methods)}
+    for name, most in (("order 2", 2e-3), ("order 4", 2e-5)):
+        assert rows[name].gap < 1e-15 and rows[name].energy_error < most and rows[name].growth < 10
+    assert rows["RK4"].gap > 1e-5 and rows["RK4"].growth > 50
+
+
+def test_a_swing_needs_links_and_a_whole_start():
+    for problem in (kepler(0.1), replace(double_pendulum(), start={"elbow": State((1, 0), None)})):
+        with pytest.raises(ValueError, match="swing needs a problem with links"):
+            swing(problem)
 
 
 @pytest.mark.slow

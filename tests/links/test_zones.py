@@ -131,6 +131,7 @@ def passed():
     return solve(reach())
 
 
+@pytest.mark.slow
 def test_the_tip_of_an_arm_goes_past_a_ball(passed):
     assert passed.success and not failed(passed)
     clear = np.linalg.norm(tip_of(passed) - np.array([0.7, 0, 0]), axis=1)

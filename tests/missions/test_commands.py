@@ -74,6 +74,7 @@ def test_the_json_of_a_mission_has_its_legs_impulses_and_primer(folder, capsys):
     assert found["primer"]["time"][-1] == pytest.approx(found["duration"])
 
 
+@pytest.mark.slow
 def test_rows_that_are_not_met_are_told_by_leg_in_units(folder, capsys):
     code, said = run(capsys, "solve", "hohmann.py", "--set", "limit=0.1", "--json")
     found = json.loads(said.out)

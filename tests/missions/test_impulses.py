@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ import dmoc
 from dmoc import Coast, DeltaV, Impulse, Mission, Moving, PointGravity, State
 from dmoc.legs.lambert import lambert
 from dmoc.missions.arcs import cheapest_arc
-from dmoc.missions.path import cut, merged
+from dmoc.missions.checks import primer_check
+from dmoc.missions.path import merged
 from dmoc.scene.problem_file import load_problem
+from dmoc.structure.pieces import cut
 
 # Places, duration, whole revolutions, whether about +z, whether the slower one, and both velocities, for
 # mu = 1, by `izzo2015` of lamberthub 1.0.0 (J. Martinez Garrido, 2021) with tolerances of 1e-12.
@@ -208,6 +211,14 @@ def test_the_primer_vector_asks_for_a_third_impulse_and_then_for_none():
     assert found.objective == pytest.approx(0.7645999702135722, rel=1e-7)
     assert len(found.impulses) == 3 and report.ok
     assert "no further impulse would help" in report["primer"].note
+
+
+@pytest.mark.parametrize(("longest", "helps"), [(1 + 5e-5, False), (1 + 2e-4, True)])
+def test_the_primer_vector_asks_for_an_impulse_where_it_is_longer_than_at_impulses(longest, helps):
+    primer = np.array([0.0, 7.0, 9.0]), np.array([1.0, longest, 1.0])
+    found = primer_check(SimpleNamespace(primer=primer, require_problem=load_problem("hohmann").make))
+    assert found.value == pytest.approx(longest)
+    assert ("another impulse near 7 s" in found.note) == helps
 
 
 def test_a_file_of_added_impulses_is_checked_against_the_mission_as_it_was_stated(tmp_path):

@@ -28,13 +28,18 @@ from dmoc import (
     Mission,
     Periodic,
     PointGravity,
+    Pose,
     State,
     TransferProblem,
     UniformGravity,
     Via,
+    Wrench,
+    rotation,
     three_body,
 )
+from dmoc.missions.guess import guessed
 from dmoc.missions.program import MissionProgram
+from dmoc.motion.mesh import uniform_mesh
 
 # Velocity changes of Hohmann's transfer from radius 1 to radius 2 with mu = 1, and its duration.
 HOHMANN = 0.2844570503761732
@@ -223,6 +228,62 @@ def test_a_closed_path_around_a_lagrange_point():
     assert path.velocity[-1] == pytest.approx(path.velocity[0], abs=1e-6)
 
 
+def tumbling(legs):
+    """A body that moves and turns from rest to rest by force and torque."""
+    ends = Pose((0, 0, 0)), Pose((2, 1, 0), attitude=rotation((0, 1, 1), degrees=100))
+    return Mission(10.0, *ends, legs, actuator=Wrench(5.0, 5.0), inertia=(1.0, 2.0, 2.5))
+
+
+def test_a_body_that_turns_flies_two_legs_as_it_flies_one():
+    whole = tumbling([Leg(6.0)]).alone
+    one = dmoc.solve(whole, order=4, mesh=[0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.0])
+    two = dmoc.solve(tumbling([Leg(2.4), Leg(3.6)]), order=4, steps=4)
+    assert two.success and dmoc.verify(two).ok
+    assert two.objective == pytest.approx(one.objective, rel=1e-9)
+    meeting = two.legs[0].position[-1], two.legs[1].position[0]
+    assert meeting[0] == pytest.approx(meeting[1], abs=1e-9)
+    assert abs(float(two.legs[0].attitude[-1] @ two.legs[1].attitude[0])) == pytest.approx(1.0)
+
+
+def test_a_guess_of_a_body_that_turns_has_the_rates_of_its_attitudes():
+    path = guessed(tumbling([Leg(2.4), Leg(3.6)]), [(uniform_mesh(40), 2)] * 2)
+    leg = path.legs[1]
+    (attitudes,), step = leg.attitudes, leg.duration / 40
+    angle = 2 * np.arccos(abs(float(attitudes[0] @ attitudes[1])))
+    assert np.linalg.norm(leg.start_velocity[3:]) == pytest.approx(angle / step, rel=1e-2) and angle > 0.01
+    assert np.linalg.norm(attitudes, axis=1) == pytest.approx(1.0)
+
+
+def test_a_body_that_turns_goes_by_way_of_a_pose():
+    middle = Pose((1, 1, 0.5), attitude=rotation((1, 0, 0), degrees=60), velocity=None, rate=None)
+    found = dmoc.solve(tumbling([Leg((1.0, 5.0)), Via(middle), Leg((1.0, 5.0))]), order=4, steps=8)
+    assert found.success and dmoc.verify(found).ok
+    assert found.legs[1].position[0] == pytest.approx([1, 1, 0.5], abs=1e-8)
+    assert abs(float(found.legs[1].attitude[0] @ middle.fixed()[0][3:])) == pytest.approx(1.0)
+
+
+def test_a_path_that_is_driven_closes_with_all_its_velocities():
+    legs = [Leg(1.0), Via((1.0, 0.5)), Leg(2.0)]
+    found = dmoc.solve(Mission(1.0, State((0, 0), (None, None)), Periodic(), legs), order=4, steps=2)
+    first, last = found.legs
+    assert found.success and dmoc.verify(found).ok
+    assert last.velocity[-1] == pytest.approx(first.velocity[0], abs=1e-9)
+    # It is a closed cubic spline: its slopes at both knots make the acceleration continuous there, which is
+    # linear along each leg, so that the effort is its integral in closed form.
+    place = np.array([1.0, 0.5])
+    matrix = np.array([[2 / 1 + 2 / 2, 1 / 1 + 1 / 2], [1 / 1 + 1 / 2, 2 / 1 + 2 / 2]])
+    slopes = np.linalg.solve(matrix, np.outer([1, 1], 3 * (1 / 1**2 - 1 / 2**2) * place))
+    effort = 0.0
+    for span, (begin, end), (v0, v1) in (
+        (1.0, (0 * place, place), slopes),
+        (2.0, (place, 0 * place), slopes[::-1]),
+    ):
+        a0 = 6 * (end - begin) / span**2 - (4 * v0 + 2 * v1) / span
+        a1 = -6 * (end - begin) / span**2 + (2 * v0 + 4 * v1) / span
+        effort += span / 6 * float((a0**2 + a0 * a1 + a1**2).sum())
+    assert found.objective == pytest.approx(effort, rel=1e-10)
+
+
 def test_the_start_of_a_mission_may_be_free():
     def beacon(t):
         return [1.0 + 0.5 * t, 0.0 * t]
@@ -276,8 +337,30 @@ def test_a_file_holds_a_mission_to_the_last_bit(tmp_path):
     assert [(one.name, one.value) for one in dmoc.verify(back).checks] == [
         (one.name, one.value) for one in dmoc.verify(found).checks
     ]
-    again = dmoc.solve(hohmann(), guess=back)
-    assert again.success and again.iterations < 6
+    # Between two circles the place of the start is free, and a warm start wanders around; here all is fixed.
+    assert dmoc.solve(hohmann(), guess=back).success
+    dmoc.solve(gates()).save(tmp_path / "gates.nc")
+    again = dmoc.solve(gates(), guess=dmoc.load(tmp_path / "gates.nc"))
+    assert again.success and again.iterations < 4
+
+
+def test_a_check_of_the_users_own_is_told_of_the_worst_leg():
+    found = dmoc.solve(gates())
+
+    def width(evidence):
+        return dmoc.Check.of("width", float(np.ptp(evidence.position[:, 0])), 1.0 + 1e-9, "m")
+
+    def late(evidence):
+        return dmoc.Check.of("late", evidence.problem.start_time, 0.5, "s")
+
+    report = dmoc.verify(found, more=[width, late])
+    assert report["width"].ok and report["width"].value == pytest.approx(1.0)
+    assert not report["late"].ok and report["late"].note.startswith(found.problem.leg_names[-1])
+    assert not report.ok and dmoc.verify(found).ok
+    with pytest.raises(ValueError, match="'<lambda>' gives must be"):
+        dmoc.verify(found, more=[lambda evidence: True])
+    with pytest.raises(ValueError, match="name that is taken: joints"):
+        dmoc.verify(found, more=[lambda evidence: dmoc.Check.of("joints", 0.0, 1.0, "m")])
 
 
 @pytest.mark.parametrize("what", ["velocity", "impulse", "time", "mass"])

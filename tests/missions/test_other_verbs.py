@@ -179,6 +179,7 @@ def test_other_impulses_are_flown_as_they_are_given():
     assert flown.velocity[-1] == pytest.approx(flown.velocity[-2])
 
 
+@pytest.mark.slow
 def test_several_starts_find_the_other_optima_of_a_mission():
     found = mission_optima(hohmann(), 6)
     assert found[0].objective == pytest.approx(0.284457, rel=1e-4)
@@ -219,14 +220,23 @@ def test_verbs_without_a_meaning_for_missions_say_so_in_one_line(planets, capsys
         code, said = run(capsys, verb, "planets.py")
         assert code == 2 and said.err.startswith(f"error: dmoc {verb} takes a transfer, but planets.py is")
         assert said.err.count("\n") == 1
-    code, said = run(capsys, "export", "planets.py", "folder")
-    assert code == 2 and said.err.startswith("error: dmoc export takes a transfer")
     code, said = run(capsys, "simulate", "planets.py")
     assert code == 2 and "--controls FILE" in said.err and said.err.count("\n") == 1
 
 
-def test_a_mission_is_simulated_from_a_file(planets, capsys):
+def test_a_mission_is_exported_from_a_solution_in_a_file(planets, capsys):
     run(capsys, "solve", "planets.py", "--out", "flight.nc")
+    code, said = run(capsys, "export", "planets.py", "folder", "--guess", "flight.nc", "--no-c")
+    assert code == 0 and "rollout_coast_1" in said.out and "warm_solver" in said.out
+    assert (planets / "folder" / "solver.casadi").exists() and not (planets / "folder" / "c").exists()
+
+
+def test_a_mission_is_simulated_and_filmed_from_a_file(planets, capsys):
+    run(capsys, "solve", "planets.py", "--out", "flight.nc")
+    code, said = run(capsys, "animate", "flight.nc", "--frames", "3")
+    assert code == 0 and said.out == "wrote flight.gif\n" and (planets / "flight.gif").stat().st_size > 1000
+    code, said = run(capsys, "animate", "flight.nc", "--frames", "1")
+    assert code == 2 and "frames must be a whole number from 2 to 200" in said.err
     code, said = run(capsys, "simulate", "planets.py", "--controls", "flight.nc")
     assert code == 0 and "final time" in said.out and "11.3 s" in said.out
 

@@ -341,6 +341,7 @@ def test_the_reference_does_not_step_over_a_short_thrust():
     assert q[0] == pytest.approx(0.5 * (40 - 12.35), rel=1e-13)
 
 
+@pytest.mark.slow
 def test_the_reference_says_where_motion_cannot_be_integrated():
     """A fall into a point mass ends in a singularity, not in the last state before it."""
     fall = scene((1, 0), (0, 0), 3.0, KEPLER)

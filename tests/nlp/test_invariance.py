@@ -113,6 +113,7 @@ def orbits_on_fuel(length=1.0, time=1.0, mass=1.0, turn=None, begin=0.0):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_least_fuel_has_the_same_optimum_in_like_iterations():
     earth = math.sqrt(7e6**3 / EARTH)
     frames = [

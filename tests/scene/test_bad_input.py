@@ -283,7 +283,7 @@ ANYTHING = st.recursive(
     SCALARS, lambda inner: st.lists(inner, max_size=4) | st.lists(inner, max_size=4).map(tuple), max_leaves=6
 )
 QUICK = settings(
-    max_examples=60,
+    max_examples=30,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -614,7 +614,7 @@ def empty(tmp_path, monkeypatch):
 OPTIONS = [(verb, option) for verb, (_, options) in VERBS.items() for option in options]
 # where a file is written every other text is a good name
 NO_FILES = ["", " ", ".", "..", "/", "a" * 300, "no/such/file.nc", "x.gif", "/dev/null"]
-SHARES = [4, pytest.param(1, marks=pytest.mark.slow)]
+SHARES = [8, pytest.param(1, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("share", SHARES)

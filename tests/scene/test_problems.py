@@ -141,6 +141,7 @@ def test_drone_hop_meets_indirect_shooting():
     assert solution.position[:, 2].min() > -1e-9
 
 
+@pytest.mark.slow
 def test_halo_transfer_is_the_same_on_fine_meshes_and_no_worse_than_twenty_segments():
     halo = make("halo_transfer")
     default, fine = solve(halo), solve(halo, order=8, steps=100)
@@ -150,3 +151,43 @@ def test_halo_transfer_is_the_same_on_fine_meshes_and_no_worse_than_twenty_segme
     assert fine.final_mass > 0.98420
     equal = solve(halo, order=4, mesh=np.linspace(0, 1, 101))
     assert not verify(equal)["reference"].ok
+
+
+def test_bryson_and_denhams_arcs_give_the_closed_form_to_rounding():
+    for ceiling in (1 / 9, 0.1):
+        found = solve(make("bryson_denham", ceiling=ceiling), structure=True)
+        assert found.objective == pytest.approx(4 / (9 * ceiling), rel=1e-11)
+        # It meets the ceiling after three times its height, at the speed of 1.
+        assert [leg.duration for leg in found.legs] == pytest.approx(
+            [3 * ceiling, 1 - 6 * ceiling, 3 * ceiling], abs=1e-3
+        )
+
+
+def test_an_ascent_in_two_stages_has_the_linear_tangent_of_shooting():
+    """Two unknowns of the tangent and the time of the last burn meet height and velocity of the goal."""
+
+    def flown(begin, slope, last):
+        state, mass, time = np.zeros(4), 300e3, 0.0
+        for thrust, exhaust, lasts in ((4.2e6, 3000.0, 150.0), (7.5e5, 4400.0, last)):
+            flow = thrust / exhaust
+
+            def rate(t, s, at=(time, mass, thrust, flow)):
+                angle, push = np.arctan(begin - slope * t), at[2] / (at[1] - at[3] * (t - at[0]))
+                return [s[2], s[3], push * np.cos(angle), push * np.sin(angle) - 9.81]
+
+            state = solve_ivp(rate, (time, time + lasts), state, method="DOP853", rtol=1e-12, atol=1e-6).y[
+                :, -1
+            ]
+            time, mass = time + lasts, mass - flow * lasts - (18e3 if not time else 0.0)
+        return state, mass
+
+    def missed(z):
+        (_, height, along, up), _ = flown(z[0], z[1] / 100, 100 * z[2])
+        return [(height - 200e3) / 1e5, (along - 7.8e3) / 1e3, up / 1e3]
+
+    begin, slope, last = root(missed, [1.0, 0.2, 3.0], tol=1e-12).x
+    found = solve(make("two_stage_ascent"))
+    assert found.final_mass == pytest.approx(flown(begin, slope / 100, 100 * last)[1], rel=5e-8)
+    for leg in found.legs:
+        tangent = leg.force[:, 1] / leg.force[:, 0]
+        assert tangent == pytest.approx(begin - slope / 100 * leg.time, abs=1e-6)

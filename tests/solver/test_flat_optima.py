@@ -132,6 +132,7 @@ def test_a_cost_that_is_not_flown_fails_the_ledger():
     assert not check.ok
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_too_small_on_every_mesh_is_still_told():
     slow = replace(RAMPS, constraints=[SpeedLimit(0.11)])
     for options in ({"tol": 1e-4}, {"order": 6}):

@@ -141,6 +141,7 @@ def test_a_limit_that_is_off_by_orders_of_magnitude(name):
     assert not solve(problem(0.97 * needed), steps=100).success
 
 
+@pytest.mark.slow
 def test_far_off_limits_of_force_and_speed_together():
     def weak(force, speed):
         return rest_to_rest((10.0, 0.0), 5.0, actuator=BallForce(force), constraints=[SpeedLimit(speed)])
@@ -246,6 +247,7 @@ def test_the_worst_rows_are_in_units_of_the_problem():
     assert lacking == pytest.approx(4 / 1.9 * 0.5 - 0.5 * 1.9, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_dry_mass_that_leaves_propellant_enough():
     """Two short burns and a coast change the velocity by 2 d / T at least, which takes so much propellant."""
     way, duration, exhaust, mass = 2.0, 4.0, 20.0, 1.7
@@ -265,6 +267,7 @@ def test_the_dry_mass_that_leaves_propellant_enough():
     assert answer.success, answer.message
 
 
+@pytest.mark.slow
 def test_between_two_attractors_the_verdict_is_one_of_the_guess():
     """One that passes on the wrong side of an attractor needs far more than another one would."""
     hurried = TransferProblem(
@@ -279,6 +282,7 @@ def test_between_two_attractors_the_verdict_is_one_of_the_guess():
     assert "a path near the guess needs a force limit of" in failed.message, failed.message
 
 
+@pytest.mark.slow
 def test_what_a_wide_rounding_burns_is_not_taken_for_a_lack_of_propellant():
     """On the coarsest mesh |F| is rounded so widely that the engine at rest burns a fifth of the propellant."""
     way, duration, exhaust, mass = 2.65, 3.72, 27.87, 1.289

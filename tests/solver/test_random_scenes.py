@@ -87,7 +87,7 @@ MOST = [(orbit_raise, {"tol": 1e-3}), (free_flyer, {}), (rendezvous, {})]
 MORE = [(make, {}) for make in (drone_hop, formation, lunar_landing, bang_bang, earth_mars, hovercraft)]
 SLOW = pytest.mark.slow
 CASES = [
-    *(pytest.param(*case, 20, id=case[0].__name__) for case in MOST),
+    *(pytest.param(*case, 8, id=case[0].__name__) for case in MOST),
     *(pytest.param(*case, 3, id=case[0].__name__) for case in MORE),
     *(pytest.param(*case, 200, id=f"{case[0].__name__} at length", marks=SLOW) for case in MOST + MORE),
 ]

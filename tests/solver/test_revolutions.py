@@ -63,6 +63,7 @@ def test_a_fixed_duration_asks_nothing():
     assert not any(level.question for level in solve(fixed).ladder)
 
 
+@pytest.mark.slow
 def test_an_orbit_as_the_goal_is_tried_too():
     """From radius 1 to 3 by two burns: impulses (Hohmann) take 0.3938, gravity losses a little more."""
     problem = TransferProblem(
@@ -81,6 +82,7 @@ def test_an_orbit_as_the_goal_is_tried_too():
     assert verify(solution).ok
 
 
+@pytest.mark.slow
 def test_a_limit_of_force_that_no_duration_meets_is_explained():
     problem = TransferProblem(
         1.0,

@@ -49,6 +49,7 @@ def test_time_that_is_enough_changes_nothing():
     assert solution.success and solution.warnings == ()
 
 
+@pytest.mark.slow
 def test_the_search_for_a_cause_ends_in_time():
     problem = load_problem("free_flyer").make(duration=10.0)
     whole = solve(problem)

@@ -44,6 +44,7 @@ def test_a_tolerance_may_begin_with_two_held_steps():
     assert verify(found).ok and found.objective == pytest.approx(2.0, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_contacts_with_zones_take_local_steps_and_their_error_is_foreseen():
     coarse, fine = asked("free_flyer", 1e-4), asked("free_flyer", 1e-5)
     assert verify(fine).ok and fine.error.largest <= 1e-5 and fine.steps < 2500
@@ -81,6 +82,7 @@ def test_what_the_rounding_of_the_thrust_costs_is_foreseen():
     assert wide.objective - narrow.objective == pytest.approx(costs, rel=0.02)
 
 
+@pytest.mark.slow
 def test_where_the_rounding_of_the_thrust_costs_more_than_the_tolerance_it_is_rounded_less():
     case = load_problem("two_body_fuel").make()
     coarse = replace(case, actuator=replace(case.actuator, smoothing=1e-3))

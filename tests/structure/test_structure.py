@@ -146,6 +146,7 @@ def test_the_order_of_the_scheme_across_free_switches(order, steps):
 # What deceives: the wrong answer comes out red, or is not reached.
 
 
+@pytest.mark.slow
 def test_steps_too_long_for_a_coast_past_a_moon_come_out_red():
     """Free durations let a coarse mesh cheat: the coast past the Moon is no path of the motion."""
     problem = gallery("halo_transfer")
@@ -176,10 +177,14 @@ def test_an_empty_leg_is_dropped():
     found = dmoc.solve(problem, structure=True)
     known = from_plain(found.arcs)
     assert kinds(found) == [BURN, COAST, BURN]
-    # A burn where nothing is to be gained by one shrinks to its shortest duration.
+    # A burn where nothing is to be gained by one shrinks to its shortest duration. The coast before it has its
+    # length: an empty burn may else stand anywhere.
     middle = 0.5 * (known[0].end + known[1].end)
     arcs = (known[0], known[1]._replace(end=middle), Arc(BURN, middle + 0.003), *known[1:])
-    climb = Climb(mission_of(problem, arcs), None, None, False, None)
+    mission = mission_of(problem, arcs)
+    coast = replace(mission.legs[1], duration=4.0 * (middle - known[0].end))
+    mission = replace(mission, legs=[mission.legs[0], coast, *mission.legs[2:]])
+    climb = Climb(mission, None, None, False, None)
     attempt = climb.attempt(path_of(problem, arcs, found.legs), near=NEAR[0])
     assert attempt.solved
     assert [arc.kind for arc in improved(problem, arcs, answered(climb, attempt))] == kinds(found)
@@ -214,11 +219,52 @@ def test_a_file_holds_the_structure(tmp_path):
     ]
 
 
+def test_the_structure_of_a_transfer_is_a_guess_and_gives_its_controls():
+    problem = gallery("two_body_fuel")
+    found = dmoc.solve(problem, tol=1e-6)
+    again = dmoc.solve(problem, order=4, steps=60, guess=found)
+    assert again.success and again.objective == pytest.approx(found.objective, rel=2e-3)
+    flight = dmoc.simulate(problem, found)
+    assert flight.position[-1] == pytest.approx(found.position[-1], abs=1e-6)
+    assert flight.mass[-1] == pytest.approx(1.0 - found.objective, abs=1e-9)
+
+
 def test_an_answer_of_one_arc_is_that_of_the_ordinary_ladder():
     problem = gallery("point_to_point")
     assert solve_by_structure(problem) is None
     one, other = dmoc.solve(problem), dmoc.solve(problem, structure=True)
     assert one.objective == other.objective and one.ladder[-1].steps == other.ladder[-1].steps
+
+
+@pytest.mark.parametrize(
+    ("numerics", "legs"),
+    [
+        ({"tol": 1e-7}, True),
+        ({"tol": 1e-4}, False),
+        ({"tol": 1e-7, "structure": False, "time_limit": 0.5}, False),
+        ({"tol": 1e-7, "order": 4, "time_limit": 0.5}, False),
+        ({}, False),
+    ],
+)
+def test_a_tight_tolerance_takes_structure_by_itself(numerics, legs):
+    problem = TransferProblem(
+        1.0,
+        State((0, 0), (0, 0)),
+        State((1, 0), (0, 0)),
+        4.0,
+        actuator=Engine(1.0, exhaust_velocity=5.0),
+        objective=Fuel(),
+    )
+    found = dmoc.solve(problem, **numerics)
+    assert hasattr(found, "legs") == legs
+    if legs:
+        assert [arc.kind for arc in from_plain(found.arcs)] == [BURN, COAST, BURN]
+        assert found.success and dmoc.verify(found).ok and found.tolerance == 1e-7
+
+
+def test_without_switches_a_tight_tolerance_is_the_ladder():
+    problem = TransferProblem(1.0, State((0,), (0,)), State((1,), (0,)), 1.0)
+    assert not hasattr(dmoc.solve(problem, tol=1e-8), "legs")
 
 
 def test_what_structure_does_not_take_is_refused():

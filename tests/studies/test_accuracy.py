@@ -62,6 +62,7 @@ def test_the_reference_is_known_better_than_what_is_judged_by_it():
     assert value == pytest.approx(RENDEZVOUS, rel=1e-9) and doubt < 1e-9
 
 
+@pytest.mark.slow
 def test_an_error_below_the_doubt_of_the_reference_is_not_claimed():
     rows = work_precision(load_problem("drone_hop").make(), (8,), (100, 200), repeats=1)
     _, doubt = best_known(load_problem("drone_hop").make())
@@ -182,6 +183,7 @@ def test_drift_finds_the_period_around_any_attractor_and_asks_where_there_is_non
         drift(case, 2, {"Euler": (10,)})
 
 
+@pytest.mark.slow
 def test_a_picture_of_what_was_solved(tmp_path):
     rows = work_precision(
         load_problem("rendezvous").make(), (4, 8), (8, 16), 1, reference=RENDEZVOUS, cold=True

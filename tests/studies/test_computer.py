@@ -14,6 +14,7 @@ def test_a_linear_solver_is_here_if_it_solves(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_the_table_names_everything(capsys):
     found = examine(seconds=0.0)
     assert set(PACKAGES) < set(found.versions) and found.cores >= 1

@@ -98,6 +98,7 @@ def test_a_first_line_that_does_not_hold_is_refused_with_a_remedy(out, head, wor
         assert journal.records == {}
 
 
+@pytest.mark.slow
 def test_the_command_says_so_in_a_line_and_goes_on(tmp_path, capfd, monkeypatch):
     """Of four solves the journal of a sweep that was stopped has two, one of them damaged."""
     monkeypatch.chdir(tmp_path)

@@ -186,6 +186,7 @@ def test_a_problem_file_that_is_another_now_ends_the_sweep(push):
         solve_point(Task(str(push), "another hash", {}, {}))
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_loses_its_point_alone(push):
     before = dict(os.environ)
     vary = {"mass": [1.0, 2.0, 3.0, 4.0, 5.0]}
@@ -283,6 +284,7 @@ def cluster(monkeypatch):
         yield made
 
 
+@pytest.mark.slow
 def test_the_workers_of_a_scheduler_do_the_same(push, cluster):
     vary, numerics = {"mass": [1.0, 2.0, 3.0]}, {"order": 4, "steps": 8}
     data = dmoc.sweep(push, vary, "far.nc", **numerics, scheduler=cluster.scheduler_address)

@@ -273,10 +273,12 @@ def test_braking_at_the_moon(numerics):
     assert least < certified(braking_at_the_moon(), **numerics).objective < 1.002 * least
 
 
+@pytest.mark.slow
 def test_an_ascent_through_the_air():
     assert certified(ascent()).objective == pytest.approx(88_900, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_power_from_sunlight():
     solution = certified(power_from_sunlight())
     assert solution.objective == pytest.approx(0.51, rel=1e-3)

@@ -73,6 +73,7 @@ def test_no_mesh_takes_far_more_iterations_than_another(steps):
     assert solution.iterations <= 30
 
 
+@pytest.mark.slow
 def test_from_planet_to_planet_the_last_line_says_how_exact_the_path_is():
     rough, exact = solve(between_planets()), solve(between_planets(), tol=1e-6)
     assert rough.raise_for_status().objective == pytest.approx(exact.raise_for_status().objective, rel=2e-3)

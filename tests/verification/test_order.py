@@ -195,7 +195,7 @@ def interpolated(solution, values, fractions):
     return np.einsum("ij,ijk->ik", weights, values[nodes])
 
 
-HELD = [(scene, order) for scene in TRANSFERS for order in (ORDERS if scene == "gravity" else (2, 8))]
+HELD = [(scene, order) for scene in TRANSFERS for order in (ORDERS if scene == "gravity" else (8,))]
 
 
 @pytest.mark.parametrize("scene, order", HELD)

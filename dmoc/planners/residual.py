@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.quaternions import QUATERNION
-from dmoc.exports.functions import Scene
-from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.momenta import legendre_function
+from dmoc.planners.functions import Scene
+from dmoc.planners.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 
 
 def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:

@@ -9,10 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.exports.functions import Scene, rows_of
-from dmoc.exports.numbers import Numbers
-from dmoc.exports.residual import largest_turn, path_symbols, residual_of, velocities_of
-from dmoc.exports.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath, Key
@@ -21,6 +17,10 @@ from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import check_mesh, transcribe_onto
 from dmoc.nlp.units import units_of
+from dmoc.planners.functions import Scene, rows_of
+from dmoc.planners.numbers import Numbers
+from dmoc.planners.residual import largest_turn, path_symbols, residual_of, velocities_of
+from dmoc.planners.terms import ATTITUDE, PLACE, TERMS, Exported, Term, named
 from dmoc.scene.problem import TransferProblem
 
 
@@ -42,7 +42,7 @@ class Planner:
 
     @cached_property
     def numbers(self) -> Numbers:
-        return Numbers(self.nlp)
+        return Numbers.of(self.nlp)
 
     @cached_property
     def _ones(self) -> dict[Key, np.ndarray]:
@@ -55,7 +55,9 @@ class Planner:
     def groups(self) -> list[dict[str, int]]:
         """For every group of unknowns, then of rows, what its multipliers are called here: names and sizes."""
         keys = list(self._ones)
-        return [_names(self.scene, key, keys, one.shape[1]) for key, one in self._ones.items() if one.size]
+        return [
+            multiplier_names(self.scene, key, keys, one.shape[1]) for key, one in self._ones.items() if one.size
+        ]
 
     @cached_property
     def multipliers(self) -> dict[str, np.ndarray]:
@@ -67,7 +69,7 @@ class Planner:
         found: dict[str, np.ndarray] = {}
         for key, value in multipliers.items():
             if value.size:
-                names = _names(self.scene, key, list(multipliers), value.shape[1])
+                names = multiplier_names(self.scene, key, list(multipliers), value.shape[1])
                 pieces = np.split(value.T, np.cumsum(list(names.values()))[:-1])
                 found |= dict(zip(names, pieces, strict=True))
         return found
@@ -121,7 +123,7 @@ class Planner:
         )
 
 
-def _names(scene: Scene, key: Key, keys: list[Key], size: int) -> dict[str, int]:
+def multiplier_names(scene: Scene, key: Key, keys: list[Key], size: int) -> dict[str, int]:
     """multipliers_goal_speed for the group goal.speed; with its kind where two groups have one name.
 
     A group of coordinates or velocities has a name for each part of the body.
@@ -178,7 +180,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     both = ca.vertcat(found["x"], found["g"])
     beyond = ca.fmax(ca.vertcat(lower, row_lower) - both, both - ca.vertcat(upper, row_upper))
     outputs = _plan_of(planner, numbers, found) | _by_group(planner, ca.fmax(beyond, 0), "violations")
-    outputs["violation"] = _largest(beyond, both)
+    outputs["violation"] = most_of(beyond, both)
     guesses = {f"guess_{name}": symbol for name, symbol in (plan | multipliers).items()}
     places = " and ".join(scene.names("places"))
     name, words = ("warm_solver", "from a former plan") if warm else ("solver", f"from a guess of the {places}")
@@ -192,7 +194,7 @@ def _plan_of(planner: Planner, numbers: dict[str, ca.MX], found: dict[str, ca.MX
     path |= planner.scene.parted(velocities_of(planner.scene, path), "speeds")
     residual = residual_of(planner.scene, path)
     largest = {
-        f"largest_{name}": _largest(ca.fabs(ca.vec(part)), ca.vec(part)) for name, part in residual.items()
+        f"largest_{name}": most_of(ca.fabs(ca.vec(part)), ca.vec(part)) for name, part in residual.items()
     }
     lam = _by_group(planner, ca.vertcat(found["lam_x"], found["lam_g"]), "multipliers")
     return {
@@ -248,7 +250,7 @@ def _by_group(planner: Planner, values: ca.MX, prefix: str) -> dict[str, ca.MX]:
     return {name.replace("multipliers", prefix, 1): value for name, value in found.items()}
 
 
-def _largest(values: ca.MX, finite: ca.MX) -> ca.MX:
+def most_of(values: ca.MX, finite: ca.MX) -> ca.MX:
     """The largest value, at least 0; infinite if `finite` is not, for a maximum in CasADi passes over NaN."""
     return ca.if_else(ca.sumsqr(finite) < np.inf, ca.mmax(ca.fmax(values, 0)), np.inf)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
 from typing import Any
@@ -13,9 +13,9 @@ import numpy as np
 
 from dmoc.basics.docstrings import documented
 from dmoc.ends.base import Boundary
-from dmoc.exports.terms import Term
 from dmoc.nlp.solving import NLP
 from dmoc.parts.rows import title
+from dmoc.planners.terms import Term
 from dmoc.scene.problem import TransferProblem
 
 # How a bound or parameter depends on a number is found by evaluating it at this value [in the number's SI
@@ -42,7 +42,7 @@ class Number:
     name: str
     value: np.ndarray
     term: Term
-    changed: Callable[[np.ndarray], TransferProblem]
+    changed: Callable[[np.ndarray], Any]
 
 
 class Numbers:
@@ -52,12 +52,14 @@ class Numbers:
     by changing one number. A number that enters in another way stays as the problem states it.
     """
 
-    def __init__(self, nlp: NLP):
-        self.nlp = nlp
-        self.base = self._taken(nlp.problem)
+    def __init__(self, problem: Any, candidates: Iterable[Number], taken: Callable[[Any], list[np.ndarray]]):
+        """`taken` gives the bounds and parameters, vector by vector, that the NLP has for a problem."""
+        self._vectors = taken
+        self.sizes = [len(vector) for vector in taken(problem)]
+        self.base = self._taken(problem)
         self.kept: list[Number] = []
         columns: list[np.ndarray] = []
-        for number in numbers_of(nlp.problem):
+        for number in candidates:
             slopes = [self._slope(number, i) for i in range(number.value.size)]
             if np.isfinite(slopes).all() and np.any(slopes):
                 self.kept.append(number)
@@ -66,6 +68,15 @@ class Numbers:
         values = np.concatenate([self.value(name) for name in self.names])
         known = np.where(np.isfinite(values), values, 0.0)
         self.matrix, self.constant = ca.sparsify(ca.DM(matrix)), ca.DM(self.base - matrix @ known)
+
+    @classmethod
+    def of(cls, nlp: NLP) -> Numbers:
+        """Those of a transfer."""
+
+        def taken(problem: TransferProblem) -> list[np.ndarray]:
+            return [*nlp.bounds(problem)[:2], nlp.parameters(problem)]
+
+        return cls(nlp.problem, numbers_of(nlp.problem), taken)
 
     @property
     def names(self) -> list[str]:
@@ -84,14 +95,12 @@ class Numbers:
         return {number.name: ca.MX.sym(number.name, number.value.size) for number in self.kept}
 
     def bounds_and_parameters(self, given: dict[str, ca.MX]) -> list[ca.MX]:
-        """Scaled lower and upper bounds of the unknowns, and parameters."""
+        """Scaled lower and upper bounds of the unknowns, of a mission those of the rows too, and parameters."""
         taken = self.constant + self.matrix @ ca.vertcat(*[given[name] for name in self.names])
-        size = self.nlp.columns.size
-        return ca.vertsplit(taken, [0, size, 2 * size, taken.numel()])
+        return ca.vertsplit(taken, np.cumsum([0, *self.sizes]).tolist())
 
-    def _taken(self, problem: TransferProblem) -> np.ndarray:
-        lower, upper, _, _ = self.nlp.bounds(problem)
-        return np.concatenate([lower, upper, self.nlp.parameters(problem)])
+    def _taken(self, problem: Any) -> np.ndarray:
+        return np.concatenate(self._vectors(problem))
 
     def _slope(self, number: Number, index: int) -> np.ndarray:
         """Derivative of bounds and parameters by one entry; NaN if they are not affine in it."""
@@ -112,21 +121,61 @@ class Numbers:
 
 def numbers_of(problem: TransferProblem) -> Iterator[Number]:
     """All numbers a problem states: of its parts, then its own."""
-    for owner in ("start", "goal", "actuator", "objective"):
-        yield from _numbers_of_part(getattr(problem, owner), owner, partial(_with, problem, owner))
-    for i, part in enumerate(problem.constraints):
-        owner = title(part, i)
-        yield from _numbers_of_part(part, owner, partial(_with_constraint, problem, i))
+    yield from _numbers_of_parts(problem, ("start", "goal", "actuator", "objective"), "", lambda twin: twin)
     duration = ("durations", "shortest and longest duration") if problem.free_duration else ("duration",) * 2
     own = {"mass": ("mass", "mass at the start", "kg"), "start_time": ("start_time", "time at the start", "s")}
     for field, (name, words, unit) in (own | {"duration": (*duration, "s")}).items():
         yield _number(problem, field, name, Term(unit, words), lambda twin: twin)
 
 
-def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem]) -> Iterator[Number]:
+def numbers_of_mission(mission: Any, names: Sequence[str]) -> Iterator[Number]:
+    """All numbers a mission states, then those that its legs state for themselves, by the `names` of these."""
+    yield from _numbers_of_parts(mission, ("start", "goal", "actuator", "objective"), "", lambda twin: twin)
+    for field, unit in (("mass", "kg"), ("start_time", "s"), ("duration", "s")):
+        if getattr(mission, field) is not None:
+            yield _timed(
+                mission, field, field, f"{field.replace('_', ' ')} of the mission", unit, lambda twin: twin
+            )
+    for place, part in enumerate(mission.legs):
+        if not hasattr(part, "control_degree"):
+            continue
+        name = names[sum(hasattr(one, "control_degree") for one in mission.legs[:place])]
+        put = partial(_with_entry, mission, "legs", place)
+        owners = [] if part.actuator is None else ["actuator"]
+        yield from _numbers_of_parts(part, owners, f"{name}_", put)
+        if part.duration is not None:
+            yield _timed(
+                part, "duration", f"{name}_duration", f"duration of {name.replace('_', ' ')}", "s", put
+            )
+
+
+def _timed(part: Any, field: str, name: str, words: str, unit: str, put: Callable[[Any], Any]) -> Number:
+    """A number, or the least and the most of one that is free between them."""
+    if np.ndim(getattr(part, field)):
+        name, words = f"{name}s", f"least and most {words}"
+    return _number(part, field, name, Term(unit, words), put)
+
+
+def _numbers_of_parts(whole: Any, owners: Sequence[str], prefix: str, put: Callable) -> Iterator[Number]:
+    """The numbers of some parts of a problem, a mission or a leg, and of its constraints."""
+
+    def changed(field: str, value: Any) -> Any:
+        return put(_with(whole, field, value))
+
+    def changed_entry(place: int, part: Any) -> Any:
+        return put(_with_entry(whole, "constraints", place, part))
+
+    for owner in owners:
+        yield from _numbers_of_part(getattr(whole, owner), f"{prefix}{owner}", partial(changed, owner))
+    for i, part in enumerate(whole.constraints or ()):
+        yield from _numbers_of_part(part, f"{prefix}{title(part, i)}", partial(changed_entry, i))
+
+
+def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], Any]) -> Iterator[Number]:
     stated = [field.name for field in fields(part)] if is_dataclass(part) else []
     entries = documented(type(part).__doc__)
-    for field in dict.fromkeys([*stated, *part.adjustable]):
+    counts = getattr(part, "counts", ())
+    for field in [one for one in dict.fromkeys([*stated, *part.adjustable]) if one not in counts]:
         called = CALLED.get(field, field)
         documented_as = field if field in entries else called
         own = getattr(part, "units_of_numbers", {})
@@ -146,19 +195,18 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], TransferProblem
             yield _number(part, field, f"{owner}_{called}", Term(unit, words + free), put)
 
 
-def _put_inside(put: Callable[[Any], TransferProblem], part: Any, field: str, twin: Any) -> TransferProblem:
+def _put_inside(put: Callable[[Any], Any], part: Any, field: str, twin: Any) -> Any:
     return put(_with(part, field, twin))
 
 
-def _put_among(put: Callable, part: Any, field: str, place: int, twin: Any) -> TransferProblem:
+def _put_among(put: Callable, part: Any, field: str, place: int, twin: Any) -> Any:
+    return put(_with_entry(part, field, place, twin))
+
+
+def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], Any]) -> Number:
     before = getattr(part, field)
-    return put(_with(part, field, (*before[:place], twin, *before[place + 1 :])))
 
-
-def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], TransferProblem]) -> Number:
-    before = getattr(part, field)
-
-    def changed(values: np.ndarray) -> TransferProblem:
+    def changed(values: np.ndarray) -> Any:
         entries = tuple(None if np.isnan(value) else float(value) for value in values)
         return put(_with(part, field, entries if np.ndim(before) else entries[0]))
 
@@ -179,6 +227,7 @@ def _with(part: Any, field: str, value: Any) -> Any:
     return twin
 
 
-def _with_constraint(problem: TransferProblem, place: int, part: Any) -> TransferProblem:
-    parts = (*problem.constraints[:place], part, *problem.constraints[place + 1 :])
-    return _with(problem, "constraints", parts)
+def _with_entry(whole: Any, field: str, place: int, part: Any) -> Any:
+    """A copy with another part in a place of a field."""
+    before = getattr(whole, field)
+    return _with(whole, field, (*before[:place], part, *before[place + 1 :]))

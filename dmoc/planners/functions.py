@@ -1,6 +1,6 @@
 """The discrete equations as CasADi functions of their own: named arguments in SI units, nothing of dmoc needed.
 
-Arguments of all functions follow one vocabulary, `dmoc.exports.terms`. Matrices have one column a node, a
+Arguments of all functions follow one vocabulary, `dmoc.planners.terms`. Matrices have one column a node, a
 step end or a step, so that what one function gives fits into the next. Every graph here is built from slices,
 maps and accumulations: its size, and that of C code made from it, does not grow with the number of steps.
 """
@@ -15,22 +15,26 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.exports.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
 from dmoc.parts.rows import with_symbols
+from dmoc.planners.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms
 from dmoc.scene.problem import TransferProblem
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What acts, and the scheme that steps it: equal steps of one order, with nodal or held controls."""
+    """What acts, and the scheme that steps it: steps of one order, with nodal or held controls.
+
+    They are equal, or `mesh` has the fractions of the duration at their ends.
+    """
 
     problem: TransferProblem
     rule: Scheme
     steps: int
     hold: bool
+    mesh: tuple[float, ...] = ()
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -206,7 +210,18 @@ def march(scene: Scene) -> ca.Function:
     return function.expand() if scene.explicit else function
 
 
-def one_step(scene: Scene) -> Exported:
+def timed_march(scene: Scene) -> ca.Function:
+    """All steps of a mesh: below the controls of each step stand the time it begins and its length [s]."""
+    one = march(scene)
+    state, same = ca.MX.sym("state", one.numel_in(0)), ca.MX.sym("same", one.numel_in(2) - 2)
+    below = ca.MX.sym("below", one.numel_in(1) + 2)
+    end, *found = one(state, below[:-2], ca.vertcat(below[-2:], same))
+    # The count of steps, by which those of equal length know their time, stays 0.
+    function = ca.Function("timed", [state, below, same], [ca.vertcat(end[:-1], 0), *found])
+    return function.mapaccum("march_all", scene.steps)
+
+
+def one_step(scene: Scene, name: str = "step") -> Exported:
     """The one-step map."""
     given = scene.symbols(*scene.names("place"), *scene.names("speed"), "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
@@ -221,13 +236,13 @@ def one_step(scene: Scene) -> Exported:
     outputs |= scene.parted(velocity, "speed", "next_")
     if scene.burns:
         outputs["next_mass"] = end[-2]
-    function = named("step", given, outputs)
+    function = named(name, given, outputs)
     words = "one step of the integrator; forces at its nodes, or one that is held"
     terms = scene.terms | number_terms(numbers)
     return Exported(function.expand() if scene.explicit else function, words, terms)
 
 
-def all_steps(scene: Scene) -> Exported:
+def all_steps(scene: Scene, name: str = "rollout") -> Exported:
     """The integrator over all steps from the start."""
     state_names = *scene.names("place"), *scene.names("speed")
     given = scene.symbols(*state_names, "mass", "start_time", "duration", "forces")
@@ -236,12 +251,18 @@ def all_steps(scene: Scene) -> Exported:
     q, v = scene.joined(given, "place"), scene.joined(given, "speed")
     m, t = given["mass"], given["start_time"]
     state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), scene.momentum(t, q, v, m), m, 0)
-    steps = march(scene).mapaccum("march_all", scene.steps)
-    same = ca.vertcat(t, given["duration"] / scene.steps, q, *numbers.values())
-    _, moves, masses, speeds = steps(state, scene.split(given["forces"]), same)
+    forces, same = scene.split(given["forces"]), ca.vertcat(q, *numbers.values())
+    if scene.mesh:
+        ends = ca.DM(scene.mesh).T
+        times = ca.vertcat(t + given["duration"] * ends[:-1], given["duration"] * ca.diff(ends, 1, 1))
+        _, moves, masses, speeds = timed_march(scene)(state, ca.vertcat(forces, times), same)
+    else:
+        steps = march(scene).mapaccum("march_all", scene.steps)
+        same = ca.vertcat(t, given["duration"] / scene.steps, same)
+        _, moves, masses, speeds = steps(state, forces, same)
     inner = ca.repmat(q, 1, scene.nodes - 1) + moves
     outputs = scene.parted(ca.horzcat(q, inner), "places") | scene.parted(ca.horzcat(v, speeds), "speeds")
     if scene.burns:
         outputs["masses"] = ca.horzcat(m, masses)
     words = f"the integrator over all steps, from {' and '.join(state_names)} at the start"
-    return Exported(named("rollout", given, outputs), words, scene.terms | number_terms(numbers))
+    return Exported(named(name, given, outputs), words, scene.terms | number_terms(numbers))

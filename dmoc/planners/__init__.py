@@ -1,0 +1,1 @@
+"""Functions of problems that need nothing of dmoc: integrator, residual, solver."""
