@@ -127,6 +127,7 @@ if TYPE_CHECKING:
     from dmoc.parts.speed import SpeedLimit as SpeedLimit
     from dmoc.parts.zones import ApproachCone as ApproachCone
     from dmoc.parts.zones import KeepIn as KeepIn
+    from dmoc.planets.planet import planet as planet
     from dmoc.results.solution import Solution as Solution
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.scene.mission import Mission as Mission

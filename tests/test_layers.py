@@ -15,6 +15,7 @@ ROOT = Path(dmoc.__file__).parent
 LAYERS = [
     ["basics"],
     ["effects"],
+    ["planets"],
     ["configurations"],
     ["parts"],
     ["bodies", "links"],

@@ -254,6 +254,10 @@ class TabulatedMotion(Part):
         t = ca.MX.sym("t")
         return position, ca.Function("slope", [t], [ca.jacobian(position(t), t)], {"never_inline": True})
 
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Positions at times within the table [m], shape (count, dimension)."""
+        return np.array(self._spline[0](np.asarray(times, float)[None, :])).T
+
     def __call__(self, t: Any) -> Any:
         position, slope = self._spline
         # CasADi's spline is zero outside of its table; the motion goes on straight ahead there instead

@@ -179,9 +179,9 @@ class Moving(Boundary):
     def words(self) -> str:
         parts = []
         if self.has_position:
-            parts.append(
-                f"a point that moves, with {'any velocity' if self.velocity is None else 'its velocity'}"
-            )
+            # a planet has a name
+            what = getattr(self.position, "title", "a point that moves")
+            parts.append(f"{what}, with {'any velocity' if self.velocity is None else 'its velocity'}")
         if self.turns_body:
             parts.append(f"an attitude that turns, with {'any rate' if self.rate is None else 'its rate'}")
         return " and ".join(parts)

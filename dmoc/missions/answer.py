@@ -20,6 +20,7 @@ from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.mission import Mission
 from dmoc.solver.rung import cut_short
 
@@ -39,9 +40,8 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     mission, program, answer = climb.mission, attempt.program, attempt.answer
     path, status = attempt.path, answer.status
     costs = costs_of(program, answer.x)
-    about = Provenance(
-        mission.name, mission.parameters, path.begins[0], mission.objective.unit_with(mission.actuator)
-    )
+    unit = mission.objective.unit_with(mission.actuator)
+    about = Provenance(mission.name, mission.parameters, path.begins[0], unit, **dates_of(mission))
     legs = tuple(
         _leg_solution(mission, i, path, costs[i], status, climb.levels[-1]) for i in range(len(path.legs))
     )
@@ -160,4 +160,4 @@ def _warnings(mission: Mission, legs: Sequence[Solution]) -> tuple[str, ...]:
             other = "shorter" if bound == "shortest" else "longer"
             ends = f"{name} ends on its {bound} duration of {lasting(leg.duration, 6)}"
             found.append(f"{ends}: a {other} one may cost less")
-    return tuple(found)
+    return (*found, *cautions_of(mission))

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.plain import finite
+from dmoc.reports.dates import dates_object
 from dmoc.reports.verdict import accuracy
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             }
             for check in listed
         },
+        **dates_object(solution),
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
         **(_of_team(solution) if hasattr(solution, "members") else {}),
     }

@@ -8,6 +8,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from dmoc.basics.digits import lasting
+from dmoc.reports.dates import dates_rows
 from dmoc.reports.layout import effect_words, pairs, plain_table
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def mission_scene(mission: Mission) -> RenderableType:
         ends = mission.duration if isinstance(mission.duration, tuple) else (mission.duration,)
         rows.append(("duration", " to ".join(lasting(end, 6) for end in ends)))
     rows.append(("objective", mission.objective.words().rstrip(".")))
+    rows += dates_rows(mission)
     return pairs(rows)
 
 

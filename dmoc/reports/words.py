@@ -14,6 +14,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from dmoc.basics.digits import lasting
+from dmoc.reports.dates import dates_rows, dates_words
 from dmoc.reports.ends import body_words, final_rows, goal_words, met_words, start_words
 from dmoc.reports.layout import console, effect_words, pairs, plain_table, value_words
 from dmoc.reports.missions import legs_table, mission_scene
@@ -49,6 +50,7 @@ def scene(problem: TransferProblem) -> RenderableType:
             ("effects", [effect_words(effect) for effect in problem.effects] or "none: the body is free"),
             ("actuator", problem.actuator.words()),
             ("objective", _objective(problem)),
+            *dates_rows(problem),
             *([("links", [link.words() for link in problem.links])] if problem.links else []),
             ("constraints", [f"{one.on} {one.words()}".strip() for one in problem.constraints] or "none"),
         ]
@@ -189,7 +191,7 @@ def figures(solution: Solution) -> str:
         parts.append(f"duration {lasting(solution.duration)}")
     if name != "final mass" and abs(solution.final_mass - problem.mass) > 1e-9 * problem.mass:
         parts.append(f"final mass {solution.final_mass:.8g} kg")
-    return ", ".join(filter(None, [*parts, met_words(solution)]))
+    return ", ".join(filter(None, [*parts, met_words(solution), dates_words(solution)]))
 
 
 @contextmanager

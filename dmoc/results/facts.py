@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from dmoc.scene.clock import dates_of
 from dmoc.scene.problem import TransferProblem
 
 
@@ -67,6 +68,9 @@ class Provenance:
         Of dmoc, casadi, numpy and python when it was saved; empty before.
     created : str
         When it was saved, in UTC; empty before.
+    epoch, frame, center : str
+        Date of t = 0 (TDB, ISO text), axes (ECLIPJ2000 or ICRF) and the body at the origin; empty where
+        nothing in the scene knows them.
     """
 
     problem_name: str = "problem"
@@ -79,6 +83,9 @@ class Provenance:
     source_hash: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     created: str = ""
+    epoch: str = ""
+    frame: str = ""
+    center: str = ""
 
     @classmethod
     def of(cls, problem: TransferProblem, options: dict[str, Any] | None = None) -> Provenance:
@@ -91,4 +98,5 @@ class Provenance:
             tuple(problem.actuator.labels(problem.dimension)),
             tuple(problem.actuator.units(problem.dimension)),
             options or {},
+            **dates_of(problem),
         )

@@ -42,6 +42,9 @@ DUAL_UNITS = {
     "duration": "s",
 }
 
+# The attributes of a scene with real dates.
+DATES = ("epoch", "frame", "center")
+
 # How the control goes on from one node to the next.
 BETWEEN = (
     "; within a step the polynomial through its nodes or, where that breaks a limit, another control of the "
@@ -171,6 +174,8 @@ def provenance_of(facts: dict[str, Any], control_labels: tuple[str, ...] = ()) -
         str(facts["source_hash"]),
         json.loads(facts["versions"]),
         str(facts["created"]),
+        # Only scenes with real dates have them.
+        *(str(facts.get(name, "")) for name in DATES),
     )
 
 
@@ -201,6 +206,7 @@ def _attributes(solution: Any) -> dict[str, Any]:
         "created": about.created,
         "start_time": about.start_time,
         "time_unit": "s",
+        **{name: value for name in DATES if (value := getattr(about, name))},
         "objective_unit": about.objective_unit,
         "hold": int(getattr(solution, "hold", False)),
         "success": int(solution.success),

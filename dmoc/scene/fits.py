@@ -14,6 +14,7 @@ from dmoc.effects.base import Body, Conservative
 from dmoc.effects.user_functions import evaluated
 from dmoc.ends.base import Boundary
 from dmoc.parts.rows import Row
+from dmoc.scene.clock import clock_of
 
 
 def turning_checked(system: Any, inertia: Any, start: Boundary, goal: Boundary) -> dict[str, Any]:
@@ -91,7 +92,7 @@ def check_body_effect(effect: Any, inertia: Any) -> None:
 
 
 def check_functions(problem: Any) -> None:
-    """Raise ValueError if a method of a user's own part gives another number of values than it must."""
+    """Raise ValueError if a user's own part gives another number of values than it must, or dates differ."""
     n, actuator = problem.dimension, problem.actuator
     t, q, v, m = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
     u = ca.SX.sym("u", problem.controls)
@@ -120,6 +121,7 @@ def check_functions(problem: Any) -> None:
             raise ValueError(
                 f"{type(part).__name__}.{name} must give a list of dmoc.Row; it gives {short(rows)}"
             )
+    clock_of(problem)
 
 
 def _is_users(part: Any) -> bool:

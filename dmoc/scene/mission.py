@@ -18,6 +18,7 @@ from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort, FinalMass, Fuel, Objective
+from dmoc.scene.clock import clock_of
 from dmoc.scene.problem import TransferProblem
 
 # The shortest duration of a leg that gives none is this part of the mission's longest [-].
@@ -109,6 +110,7 @@ class Mission:
                 part.check_dimension(self.dimension)
         self._check_impulses()
         _ = self.stretches
+        clock_of(self)
 
     @property
     def dimension(self) -> int:
@@ -129,6 +131,15 @@ class Mission:
     def start_bounds(self) -> tuple[float, float]:
         """Earliest and latest time of the start [s]."""
         return both_ends(self.start_time)
+
+    @property
+    def duration_bounds(self) -> tuple[float, float]:
+        """Shortest and longest time that all legs may take together [s]."""
+        spans = [both_ends(self.duration_of(leg)) for leg in self.plan]
+        for first, last, together in self.sums:
+            spans[first : last + 1] = [both_ends(together), *[(0.0, 0.0)] * (last - first)]
+        shortest, longest = (sum(side) for side in zip(*spans, strict=True))
+        return shortest, longest if self.duration is None else min(longest, both_ends(self.duration)[1])
 
     @property
     def dropped(self) -> float:
@@ -209,8 +220,7 @@ class Mission:
     def _whole(self) -> TransferProblem:
         """The mission as one transfer by its first leg: it checks the parts and completes the ends."""
         goal = Loose.like(self.start) if self.closes else self.goal
-        longest = sum(both_ends(self.duration_of(leg))[1] for leg in self.plan)
-        shortest = sum(both_ends(self.duration_of(leg))[0] for leg in self.plan)
+        shortest, longest = self.duration_bounds
         span = shortest if shortest == longest else (shortest, longest)
         share = Share(self.objective)
         return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])

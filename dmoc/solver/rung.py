@@ -19,6 +19,7 @@ from dmoc.parts.constraint import Constraint
 from dmoc.results.facts import Level
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
+from dmoc.scene.clock import cautions_of
 from dmoc.scene.problem import TransferProblem
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
@@ -98,14 +99,15 @@ class Rung:
         bound = self.problem.limit_of_duration(duration)
         if not self.solved:
             return ()
+        known = (*self.notes, *cautions_of(self.problem))
         if bound is not None:
             other = "shorter" if bound == "shortest" else "longer"
             told = f"the duration ends on its {bound} limit of {lasting(duration, 6)}"
-            return (*self.notes, f"{told}: a {other} one may cost less")
+            return (*known, f"{told}: a {other} one may cost less")
         if self.gain > WORTH_TELLING:
             told = f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less"
-            return (*self.notes, told)
-        return self.notes
+            return (*known, told)
+        return known
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:

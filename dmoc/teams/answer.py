@@ -13,6 +13,7 @@ from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.team import Team
 from dmoc.solver.rung import cut_short
@@ -46,6 +47,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         team.start_time,
         team.objective.unit_with(team.actuator),
         options=climb.options,
+        **dates_of(team),
     )
     costs = costs_of(program, answer.x)
     members = [
@@ -120,4 +122,4 @@ def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
     )
     if worst is not None:
         found.append(f"{worst.name} is broken by {worst.value:.3g} m: try another guess or a finer mesh")
-    return tuple(found)
+    return (*found, *cautions_of(team))

@@ -52,6 +52,7 @@ MISSIONS = {
     "bielliptic": 55,
     "cw_impulses": 23,
     "delta_iii": 24,
+    "earth_mars_2028": 10,
     "gates": 7,
     "halo_orbit": 6,
     "hohmann": 14,

@@ -231,6 +231,15 @@ MAKES = {
     "Wrench": {"force_limit": 2.0, "torque_limit": 2.0, "frame": "body", "lever": 1.0},
     "circular_motion": {"radius": 9.0, "rate": 0.1, "phase": 0.0, "inclination": 0.0},
     "kepler_motion": ELLIPSE,
+    "planet": {
+        "name": "mars",
+        "epoch": "2028-11-20",
+        "frame": "ecliptic",
+        "center": "sun",
+        "start": 0.0,
+        "duration": 1e6,
+        "ephemeris": "mean elements",
+    },
     "tabulated_motion": {"times": (0, 1, 2, 3), "positions": ((9, 0), (9, 1), (9, 2), (9, 3))},
     "three_body": {"mass_ratio": 0.1},
 }

@@ -42,6 +42,10 @@ def test_defaults_are_solved_and_every_check_holds(name):
 
 @pytest.mark.parametrize("known", REFERENCES["TABLE"], ids=lambda known: f"{known.problem}-{known.quantity}")
 def test_published_and_closed_form_optima_are_met(known):
+    if known.problem == "earth_mars_2028":
+        # its reference is for positions of the ephemeris
+        pytest.importorskip("jplephem")
+        pytest.importorskip("skyfield_data")
     solution = known.solve()
     assert abs(known.difference(solution)) < known.tolerance
     table = REFERENCES["PLACE"].search(REFERENCES["README"].read_text())[0]

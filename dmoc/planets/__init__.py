@@ -1,0 +1,1 @@
+"""The Sun, the Moon and the planets at real dates."""
