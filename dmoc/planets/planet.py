@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
+from dmoc.basics.files import as_path
 from dmoc.effects.base import Part
 from dmoc.effects.motion import TabulatedMotion, tabulated_motion
 from dmoc.planets import ephemeris as files
@@ -28,6 +29,8 @@ ERROR = 1e3
 # Spacings of a table that are tried [days], and the most times that a table may have.
 SPACINGS = (32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)
 MOST_TIMES = 100_000
+# Numbers of NAIF are whole numbers of 32 bits.
+LARGEST = 2**31
 
 
 def planet(
@@ -90,7 +93,7 @@ def planet(
     body, origin = _known("name", name), _known("center", center)
     if body == origin:
         raise ValueError(f"the center is {body} itself: it is always at the origin; give another center")
-    if frame not in FRAMES:
+    if not isinstance(frame, str) or frame not in FRAMES:
         raise ValueError(f"frame must be {' or '.join(map(repr, FRAMES))}; got {short(frame)}")
     epoch = iso(epoch)
     start = number("start", start, "s")
@@ -171,7 +174,7 @@ class PlanetMotion(Part):
 
 def _known(argument: str, value: Any) -> str:
     """The name of a body in lower case, or NAIF's number of it as text."""
-    if isinstance(value, int) and not isinstance(value, bool):
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < LARGEST:
         return next((name for name, numbers in NUMBERS.items() if numbers[0] == value), str(value))
     found = value.lower().strip() if isinstance(value, str) else ""
     if found not in NUMBERS:
@@ -185,11 +188,11 @@ def _file(given: Any) -> Path | None:
     """The file of the ephemeris; None for mean elements."""
     if given is None:
         return files.default_file()
-    if given == MEAN:
+    if isinstance(given, str) and given == MEAN:
         return None
     if not isinstance(given, (str, os.PathLike)):
         raise ValueError(f"ephemeris must be the path of a .bsp file, {MEAN!r} or None; got {short(given)}")
-    return Path(given)
+    return as_path(given)
 
 
 def _turned(positions: np.ndarray, native: str, frame: str) -> np.ndarray:

@@ -126,6 +126,12 @@ def test_mean_elements_without_the_packages(monkeypatch):
         planet("mars", "2028-11-20", ephemeris="other.bsp")
 
 
+def test_a_transfer_says_that_its_planets_are_approximate():
+    found = solve(transfer(here("earth"), here("mars")), order=4, steps=20)
+    assert found.success and len(found.warnings) == 1
+    assert "earth (mean elements, within 23,000 km) and mars" in found.warnings[0]
+
+
 def test_the_ephemeris_may_be_named_by_the_environment(monkeypatch, tmp_path):
     pytest.importorskip("jplephem")
     monkeypatch.setenv("DMOC_EPHEMERIS", str(tmp_path / "mine.bsp"))
@@ -142,7 +148,8 @@ def test_the_ephemeris_may_be_named_by_the_environment(monkeypatch, tmp_path):
         ({"name": "vulcan"}, "name must be one of .*mars.*got 'vulcan'"),
         ({"name": None}, "name must be one of"),
         ({"name": True}, "name must be one of"),
-        ({"name": 2000433}, "2000433"),
+        ({"name": 2000433}, "no mean elements of 2000433"),
+        ({"name": 10**50}, "name must be one of"),
         ({"center": "mars"}, "the center is mars itself"),
         ({"frame": "b1950"}, "frame must be 'ecliptic' or 'icrf'; got 'b1950'"),
         ({"epoch": "tomorrow"}, "epoch must be a date as ISO text"),
