@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from dmoc.checks.evidence import Evidence as Evidence
     from dmoc.checks.verification import Check as Check
     from dmoc.checks.verification import Report as Report
+    from dmoc.conversions.convert import convert as convert
     from dmoc.effects import J2 as J2
     from dmoc.effects import Atmosphere as Atmosphere
     from dmoc.effects import Body as Body

@@ -31,7 +31,7 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports"],
+    ["studies", "sweeps", "exports", "conversions"],
     ["plots", "reports"],
     ["charts", "films"],
     ["cli"],

@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import convert as convert_command
 from dmoc.cli import new as new_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -241,6 +242,7 @@ def doctor() -> None:
 
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (convert_command.convert, "dmoc convert flight.nc --to csv"),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
     (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),

@@ -8,6 +8,44 @@ from typing import Any
 from dmoc.basics.arguments import short
 
 DAY = 86400.0
+# Days from which on TAI is so many whole seconds ahead of UTC, 10 on the first of them (IERS Bulletin C); no
+# later one was announced by 2026.
+LEAPS = (
+    *[
+        "1972-01-01",
+        "1972-07-01",
+        "1973-01-01",
+        "1974-01-01",
+        "1975-01-01",
+        "1976-01-01",
+        "1977-01-01",
+        "1978-01-01",
+    ],
+    *[
+        "1979-01-01",
+        "1980-01-01",
+        "1981-07-01",
+        "1982-07-01",
+        "1983-07-01",
+        "1985-07-01",
+        "1988-01-01",
+        "1990-01-01",
+    ],
+    *[
+        "1991-01-01",
+        "1992-07-01",
+        "1993-07-01",
+        "1994-07-01",
+        "1996-01-01",
+        "1997-07-01",
+        "1999-01-01",
+        "2006-01-01",
+    ],
+    *["2009-01-01", "2012-07-01", "2015-07-01", "2017-01-01"],
+)
+FIRST_LEAPS = 10
+# Seconds that TT, and within 2 ms TDB, is ahead of TAI.
+TT_AHEAD = 32.184
 # Julian date of midnight before the day that Python counts as 0 [days].
 BEFORE_ALL = 1721424.5
 
@@ -56,6 +94,21 @@ def minutes_of(epoch: str, seconds: float) -> str:
     """The date so many seconds after an epoch, to the minute, such as `2028-11-20 07:15`."""
     moment = _parsed(later(epoch, seconds)) + timedelta(seconds=30)
     return moment.isoformat(sep=" ", timespec="minutes")
+
+
+def utc_of(epoch: str) -> str:
+    """ISO text in UTC of an epoch in TDB, to 2 ms: TDB is taken for TT.
+
+    Raises
+    ------
+    ValueError
+        If it is before 1972, when UTC had no whole leap seconds.
+    """
+    for count, day in reversed(list(enumerate(LEAPS, FIRST_LEAPS))):
+        utc = _parsed(later(epoch, -count - TT_AHEAD))
+        if utc >= datetime.fromisoformat(day):
+            return utc.isoformat()
+    raise ValueError(f"there are no leap seconds of UTC for {epoch}: they begin with 1972")
 
 
 def _parsed(epoch: Any) -> datetime:

@@ -109,7 +109,7 @@ def planet(
             known, native = mean_elements.track(body, origin, day, parts), "ecliptic"
         else:
             known, native = files.track(file, body, origin, day, parts), "icrf"
-        return known._replace(positions=_turned(known.positions, native, frame))
+        return known._replace(positions=turned(known.positions, native, frame))
 
     table, known = _table(seen, body, start, duration)
     span = start, start + duration
@@ -195,8 +195,8 @@ def _file(given: Any) -> Path | None:
     return as_path(given)
 
 
-def _turned(positions: np.ndarray, native: str, frame: str) -> np.ndarray:
-    """Positions in the frame that was asked for, turned about the equinox."""
+def turned(positions: np.ndarray, native: str, frame: str) -> np.ndarray:
+    """Rows of 3 in the frame that is asked for, turned from their own one about the equinox."""
     if native == frame:
         return positions
     angle = OBLIQUITY if frame == "ecliptic" else -OBLIQUITY

@@ -1,0 +1,1 @@
+"""Paths in the formats of other programs: tables, CCSDS OEM, CZML."""
