@@ -77,7 +77,7 @@ def convert(
         raise ValueError(f"solution must be a dmoc.Solution, of a mission or a team too; got {short(solution)}")
     target = as_path(path)
     form = target.suffix[1:].lower() if to is None else to
-    if form not in FORMS:
+    if not isinstance(form, str) or form not in FORMS:
         given = f"the name {target.name}" if to is None else short(to)
         raise ValueError(f"a solution is written as {', '.join(FORMS)}; got {given}: say which with to")
     origin = _origin(solution, epoch, frame, center, time_system)
@@ -97,7 +97,7 @@ def _origin(solution: Any, epoch: Any, frame: Any, center: Any, scale: Any) -> O
             raise ValueError(f"{name} must be a word; got {short(value)}")
         if known and value is not None and value.upper() != known.upper():
             raise ValueError(f"the scene has the {name} {known} already; leave {name} out")
-    if scale is not None and scale not in SCALES:
+    if scale is not None and not (isinstance(scale, str) and scale in SCALES):
         raise ValueError(f"time_system must be {', '.join(SCALES)}; got {short(scale)}")
     if about.epoch and scale not in (None, "TDB"):
         raise ValueError("the scene counts time in TDB already; leave time_system out")

@@ -259,6 +259,21 @@ def test_utc_by_leap_seconds():
     assert utc_of("2017-01-01T00:01:09.184") == "2017-01-01T00:00:00"
     assert utc_of("2016-12-31T00:01:08.184") == "2016-12-31T00:00:00"
     assert utc_of("1972-01-01T00:00:42.184") == "1972-01-01T00:00:00"
+    counts = {
+        1973: 12,
+        1980: 19,
+        1984: 22,
+        1985: 22,
+        1986: 23,
+        1990: 25,
+        1993: 27,
+        1995: 29,
+        1998: 31,
+        2005: 32,
+    }
+    for year, count in (counts | {2008: 33, 2011: 34, 2014: 35, 2016: 36}).items():
+        ahead = datetime(year, 4, 1) - datetime.fromisoformat(utc_of(f"{year}-04-01"))
+        assert ahead.total_seconds() == pytest.approx(count + 32.184, abs=1e-6)
     with pytest.raises(ValueError, match="begin with 1972"):
         utc_of("1971-12-31")
 

@@ -11,6 +11,7 @@ import math
 import shutil
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -473,6 +474,10 @@ def test_constructors_and_any_value(name, data):
 
 # Solutions of 4 steps are quick, whatever else is asked for.
 CALLS = {
+    "convert": (
+        partial(dmoc.convert, path="x.svg"),
+        {"to": "csv", "epoch": "2028-11-20", "frame": "ICRF", "center": "EARTH", "time_system": "UTC"},
+    ),
     "drift": (
         dmoc.drift,
         {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
@@ -516,7 +521,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("verify", "save_figure"):
+    if name in ("convert", "verify", "save_figure"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:
@@ -535,6 +540,10 @@ VERBS = {
     ),
     "show": (["point_to_point"], ["--set"]),
     "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls"]),
+    "convert": (
+        ["nothing.nc", "--to", "csv"],
+        ["--to", "--out", "--epoch", "--frame", "--center", "--time-system"],
+    ),
     "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
     "check": (["nothing.nc"], ["--problem"]),
     "plot": (["nothing.nc"], ["--out", "--problem"]),
