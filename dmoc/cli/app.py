@@ -9,8 +9,8 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from dmoc.cli import convert as convert_command
 from dmoc.cli import new as new_command
+from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
 from dmoc.cli import study as study_command
@@ -121,33 +121,6 @@ def effects(
     report.console().print(influence_table(influences(solution, others), solution))
 
 
-@app.command(epilog="Example: dmoc simulate orbit_raise --steps 2000 --order 4")
-def simulate(
-    name: Name,
-    order: Order = None,
-    steps: Steps = None,
-    hold: Hold = False,
-    settings: Settings = None,
-    controls: Annotated[
-        Path | None, typer.Option(help="A saved solution whose controls to apply; none: coast.")
-    ] = None,
-) -> None:
-    """March the integrator forward from the start, without optimisation."""
-    import dmoc
-    from dmoc.nlp.transcription import check_mesh
-    from dmoc.reports import words as report
-
-    if steps is not None:
-        check_mesh(steps)
-    if controls is not None and (order, steps, hold) != (None, None, False):
-        raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
-    _, problem = problem_of(name, settings)
-    known = None if controls is None else dmoc.load(controls).attach(problem)
-    with ends_at_once():
-        trajectory = dmoc.simulate(problem, known, steps, 2 if order is None else order, hold)
-    report.console().print(report.motion(trajectory, problem, coast=known is None))
-
-
 @app.command(epilog="Example: dmoc check flight.nc")
 def check(file: File, source: Source = None, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
@@ -242,7 +215,8 @@ def doctor() -> None:
 
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
-    (convert_command.convert, "dmoc convert flight.nc --to csv"),
+    (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
+    (paths_command.convert, "dmoc convert flight.nc --to csv"),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
     (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),

@@ -19,6 +19,7 @@ from dmoc.cli.options import (
     NOT_SOLVED,
     SOLVED,
     Hold,
+    Json,
     Name,
     Order,
     Quiet,
@@ -40,8 +41,8 @@ def sweep(
         list[str],
         typer.Option(
             metavar="NAME=VALUES",
-            help="A parameter and its values, start:stop:count or value,value,...; repeat for a grid. "
-            "With --sample a range start:stop.",
+            help="A parameter and its values, start:stop:count, start:stop:log7 for 7 values of equal ratio, "
+            "or value,value,...; repeat for a grid. With --sample a range start:stop or start:stop:log.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Where to write the results (netCDF).")],
@@ -67,6 +68,7 @@ def sweep(
     ] = None,
     restart: Annotated[bool, switch("--restart", help="Begin anew instead of going on.")] = False,
     quiet: Quiet = False,
+    as_json: Json = False,
 ) -> None:
     """Solve a problem over a grid or a sample of its parameters.
 
@@ -82,7 +84,7 @@ def sweep(
     begun = time.perf_counter()
     numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
     spread: dict[str, Any] = {"sample": sample, "method": method, "seed": seed}
-    with _live(not quiet) as (progress, tries), _says_what_is_kept(out, tries), _warns_in_a_line():
+    with _live(not (quiet or as_json)) as (progress, tries), _says_what_is_kept(out, tries), _warns_in_a_line():
         data = sweeping.sweep(
             problem,
             parse_vary(vary),
@@ -96,7 +98,17 @@ def sweep(
             **numerics,
             **spread,
         )
+    if as_json:
+        from dmoc.reports import as_json as report_json
+
+        found = report_json.sweep_object(data, out)
+        print(report_json.as_text(found))
+        raise typer.Exit(_code(found["points"], found["solved"], found["checks_fail"]))
     raise typer.Exit(_show(data, out, time.perf_counter() - begun, tries["done"] - tries["before"], quiet))
+
+
+def _code(points: int, solved: int, broken: int) -> int:
+    return NOT_SOLVED if solved < points else CHECK_FAILED if broken else SOLVED
 
 
 def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
@@ -125,7 +137,7 @@ def _show(data: Any, out: Path, seconds: float, tries: int, quiet: bool) -> int:
     named = ", ".join(f"{name} at {count}" for name, count in failed_checks.most_common())
     checks = "" if not broken else f" Checks fail at {broken} of them ({named}), see failed_check."
     console.print(Text(words + failed + checks, "yellow" if solved < success.size or broken else "green"))
-    return NOT_SOLVED if solved < success.size else CHECK_FAILED if broken else SOLVED
+    return _code(success.size, solved, broken)
 
 
 @contextmanager

@@ -86,8 +86,8 @@ def _stretch(solution: Any, name: str) -> Stretch:
     velocity = slopes_at_nodes(path, place, solution.velocity) if place.size else np.zeros((count, 0))
     labels = made.place_labels
     columns = {"time [s]": solution.time}
-    columns |= _columns("position", labels, "m", place) | _columns("velocity", labels, "m/s", velocity)
-    columns |= _columns("force", labels, "N", _at_nodes(solution.force, path.hold, degree))
+    columns |= columns_of("position", labels, "m", place) | columns_of("velocity", labels, "m/s", velocity)
+    columns |= columns_of("force", labels, "N", _at_nodes(solution.force, path.hold, degree))
     about = solution.provenance
     control = _at_nodes(path.control, path.hold, degree)
     for i, (label, unit) in enumerate(zip(about.control_labels, about.control_units, strict=True)):
@@ -95,20 +95,21 @@ def _stretch(solution: Any, name: str) -> Stretch:
     columns["mass [kg]"] = path.mass
     if solution.attitude is not None:
         turned = made.attitude_labels if made.blocks[0].body else QUATERNION_NAMES
-        columns |= _columns("attitude", turned, "1", solution.attitude)
+        columns |= columns_of("attitude", turned, "1", solution.attitude)
         for what, values, unit in (("rate", solution.rate, "rad/s"), ("torque", solution.torque, "N m")):
             at_nodes = (
                 _at_ends(values, count, degree) if what == "rate" else _at_nodes(values, path.hold, degree)
             )
             names = [f"{label.rsplit('.', 1)[0]}." if "." in label else "" for label in turned[::4]]
-            columns |= _columns(what, [f"{body}{axis}" for body in names for axis in "xyz"], unit, at_nodes)
+            columns |= columns_of(what, [f"{body}{axis}" for body in names for axis in "xyz"], unit, at_nodes)
     if solution.wheel_momentum is not None:
         stored = _at_ends(solution.wheel_momentum, count, degree)
-        columns |= _columns("wheel momentum", [str(i + 1) for i in range(stored.shape[1])], "N m s", stored)
+        columns |= columns_of("wheel momentum", [str(i + 1) for i in range(stored.shape[1])], "N m s", stored)
     return Stretch(name, solution.time, place, velocity, columns)
 
 
-def _columns(name: str, labels: Sequence[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
+def columns_of(name: str, labels: Sequence[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of an array by names such as `position x [m]`."""
     return {f"{name} {label} [{unit}]": values[:, i] for i, label in enumerate(labels)}
 
 

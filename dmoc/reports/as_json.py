@@ -11,6 +11,7 @@ from dmoc.reports.verdict import accuracy
 
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
+    from dmoc.motion.march import Trajectory
     from dmoc.results.solution import Solution
 
 
@@ -101,6 +102,78 @@ def _of_team(solution: Any) -> dict[str, Any]:
             for apart in [solution.distance(a, b)]
         ],
     }
+
+
+def motion_object(trajectory: Trajectory, problem: Any, coast: bool) -> dict[str, Any]:
+    """The JSON object of a simulation: its end, and how much its energy changed on the way."""
+    energy = trajectory.energy
+    most, kept = energy_change(trajectory, problem, coast)
+    last = {
+        "position": trajectory.position[-1],
+        "velocity": trajectory.velocity[-1],
+        "attitude": None if trajectory.attitude is None else trajectory.attitude[-1],
+        "rate": None if trajectory.rate is None else trajectory.rate[-1],
+    }
+    return {
+        "problem": problem.name,
+        "coast": coast,
+        "steps": len(trajectory.time) - 1,
+        "start_time": float(trajectory.time[0]),
+        "final_time": float(trajectory.time[-1]),
+        **{f"final_{name}": [float(x) for x in row] for name, row in last.items() if row is not None},
+        "final_mass": float(trajectory.mass[-1]),
+        "start_energy": float(energy[0]),
+        "final_energy": float(energy[-1]),
+        "energy_change": most,
+        "energy_is_kept": kept,
+    }
+
+
+def energy_change(trajectory: Trajectory, problem: Any, coast: bool) -> tuple[float, bool]:
+    """The largest change of the energy [J/kg], and whether any is an error of the scheme: nothing does work."""
+    from dmoc.effects import Conservative
+
+    energy = trajectory.energy
+    kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
+    return float(abs(energy - energy[0]).max()), kept
+
+
+def sweep_object(data: Any, path: Any) -> dict[str, Any]:
+    """The JSON object of a sweep: how many points were solved, and each with its parameters and results."""
+    import numpy as np
+
+    from dmoc.sweeps.data import COLUMNS
+
+    varied = [str(name) for name in data.coords]
+    columns = {name: data[f"found_{name}" if name in varied else name].values for name in COLUMNS}
+    points = []
+    for at in np.ndindex(columns["success"].shape):
+        given = {
+            name: data[name].values[at if data[name].ndim == len(at) else at[data["success"].dims.index(name)]]
+            for name in varied
+        }
+        found = {name: values[at] for name, values in columns.items()}
+        points.append({name: _plain(value) for name, value in ({"parameters": given} | found).items()})
+    solved = int(columns["success"].sum())
+    objective = data["found_objective" if "objective" in varied else "objective"].attrs
+    return {
+        "problem": str(data.attrs.get("problem", "")),
+        "file": str(path),
+        "varied": varied,
+        "points": len(points),
+        "solved": solved,
+        "checks_fail": solved - int((columns["success"] & columns["checks_hold"]).sum()),
+        "objective": str(objective["kind"]),
+        "objective_unit": str(objective["units"]),
+        "results": points,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """A number, a text or a dictionary of them as JSON holds it."""
+    if isinstance(value, dict):
+        return {name: _plain(entry) for name, entry in value.items()}
+    return value.item() if hasattr(value, "item") else value
 
 
 def as_text(value: dict[str, Any]) -> str:

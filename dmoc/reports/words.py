@@ -163,12 +163,10 @@ def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = (
 
 def motion(trajectory: Trajectory, problem: TransferProblem, coast: bool) -> RenderableType:
     """The end of a simulation, and how much its energy changed on the way."""
-    from dmoc.effects import Conservative
+    from dmoc.reports.as_json import energy_change
 
     energy = trajectory.energy
-    most = float(abs(energy - energy[0]).max())
-    # where something does work, the energy changes; elsewhere a change is an error of the scheme
-    kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)
+    most, kept = energy_change(trajectory, problem, coast)
     scale = float(abs(energy).max()) if kept else 0.0
     share = f", {most / scale:.1e} of it" if scale else ""
     rows = [

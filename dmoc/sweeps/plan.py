@@ -146,15 +146,19 @@ def parse_vary(texts: Iterable[str]) -> dict[str, str]:
 
 
 def _grid(parameter: Parameter, given: Any) -> np.ndarray:
-    """The values of one axis: a text start:stop:count or value,value,..., or any sequence."""
+    """The values of one axis: a text start:stop:count, start:stop:logcount or value,..., or any sequence."""
     name = parameter.name
     if not isinstance(given, str):
         values = list(given) if isinstance(given, Iterable) else [given]
     elif ":" in given and given.strip()[0] not in "'\"":
-        start, stop, count = _numbers_of(name, given, 3, "start:stop:count, for example 8:20:25")
+        numbers, log = _without_log(given)
+        form = "start:stop:count, for example 8:20:25, or start:stop:logcount, for example 1:100:log7"
+        start, stop, count = _numbers_of(name, numbers, 3, form, given)
         if count != int(count) or not 1 <= count <= MOST_POINTS:
             raise ValueError(f"{name}: the count in {given!r} must be a whole number of at least 1")
-        values = np.linspace(start, stop, int(count)).tolist()
+        if log:
+            _check_positive(name, start, stop)
+        values = (np.geomspace if log else np.linspace)(start, stop, int(count)).tolist()
     else:
         try:
             values = list(ast.literal_eval(f"({given},)"))
@@ -208,27 +212,49 @@ def _sample(parameters: tuple, given: list, count: int, method: str, seed: int) 
     else:
         # Sobol points come in powers of two; the first `count` of the next larger one are spread as evenly
         unit = qmc.Sobol(len(ranges), seed=seed).random_base2((count - 1).bit_length())[:count]
-    low, high = np.array(ranges).T
-    return tuple((low + unit * (high - low)).T.copy())
+    spread = [
+        low * (high / low) ** u if log else low + u * (high - low)
+        for u, (low, high, log) in zip(unit.T, ranges, strict=True)
+    ]
+    return tuple(np.ascontiguousarray(values) for values in spread)
 
 
-def _range(name: str, given: Any) -> list[float]:
+def _without_log(text: str) -> tuple[str, bool]:
+    """The numbers of a range whose last part begins with log, and whether it does."""
+    before, colon, last = text.rpartition(":")
+    if not last.strip().startswith("log"):
+        return text, False
+    count = last.strip().removeprefix("log")
+    return f"{before}{colon}{count}" if count else before, True
+
+
+def _check_positive(name: str, start: float, stop: float) -> None:
+    if min(start, stop) <= 0:
+        raise ValueError(f"{name}: a range with log must be of numbers above 0; got {start:g} to {stop:g}")
+
+
+def _range(name: str, given: Any) -> tuple[float, float, bool]:
+    log = False
     if isinstance(given, str):
-        given = _numbers_of(name, given, 2, "start:stop in a sample, for example 8:20")
+        numbers, log = _without_log(given)
+        form = "start:stop in a sample, for example 8:20 or 1:100:log"
+        given = _numbers_of(name, numbers, 2, form, given)
     try:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):
         raise ValueError(f"{name}: a sample needs a range (start, stop); got {given!r:.60}") from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ValueError(f"{name}: a range must go up between finite numbers; got {low:g} to {high:g}")
-    return [low, high]
+    if log:
+        _check_positive(name, low, high)
+    return low, high, log
 
 
-def _numbers_of(name: str, text: str, count: int, form: str) -> list[float]:
+def _numbers_of(name: str, text: str, count: int, form: str, given: str) -> list[float]:
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:
         numbers = []
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{name}: {text!r} is not of the form {form}")
+        raise ValueError(f"{name}: {given!r} is not of the form {form}")
     return numbers

@@ -63,7 +63,8 @@ def sweep(
         Name or path of a problem file.
     vary : mapping
         By name of the parameter the values of the grid, or a text "start:stop:count" or
-        "value,value,..."; for a sample a range (start, stop) or "start:stop". Units as documented there.
+        "value,value,..."; for a sample a range (start, stop) or "start:stop". "start:stop:log7" has seven
+        values of equal ratio, "start:stop:log" a sample even in the logarithm. Units as documented there.
     out : path
         The netCDF file to write_sweep.
     settings : mapping

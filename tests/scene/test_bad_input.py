@@ -539,7 +539,7 @@ VERBS = {
         ["--order", "--steps", "--tol", "--set", "--out", "--plot", "--guess"],
     ),
     "show": (["point_to_point"], ["--set"]),
-    "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls"]),
+    "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls", "--plot"]),
     "convert": (
         ["nothing.nc", "--to", "csv"],
         ["--to", "--out", "--epoch", "--frame", "--center", "--time-system"],

@@ -1,0 +1,103 @@
+"""`dmoc simulate` and `dmoc convert`: paths marched forward, and paths in the formats of other programs."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dmoc.cli.options import File, Hold, Json, Name, Order, Settings, Steps, ends_at_once, problem_of, writable
+
+# Everything else is imported where it is used: `dmoc --help` answers at once.
+
+
+def simulate(
+    name: Name,
+    order: Order = None,
+    steps: Steps = None,
+    hold: Hold = False,
+    settings: Settings = None,
+    controls: Annotated[
+        Path | None, typer.Option(help="A saved solution whose controls to apply; none: coast.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="CSV", help="Write the states at all step ends here.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw path, speed and energy here: .png, .pdf or .svg.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """March the integrator forward from the start, without optimisation."""
+    import dmoc
+    from dmoc.nlp.transcription import check_mesh
+
+    if steps is not None:
+        check_mesh(steps)
+    if controls is not None and (order, steps, hold) != (None, None, False):
+        raise ValueError("--controls brings its own mesh; leave out --order, --steps and --hold")
+    writable(out, table=True)
+    writable(plot, drawn=True)
+    with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
+        _, problem = problem_of(name, settings)
+        known = None if controls is None else dmoc.load(controls).attach(problem)
+        trajectory = dmoc.simulate(problem, known, steps, 2 if order is None else order, hold)
+    if out is not None:
+        from dmoc.conversions.marched import write_marched
+
+        write_marched(trajectory, problem, out)
+    if plot is not None:
+        from dmoc.charts.motion import save_motion
+
+        save_motion(trajectory, problem, plot)
+    if as_json:
+        from dmoc.reports import as_json as report_json
+
+        print(report_json.as_text(report_json.motion_object(trajectory, problem, coast=known is None)))
+        return
+    from dmoc.reports import words as report
+
+    console = report.console()
+    console.print(report.motion(trajectory, problem, coast=known is None))
+    for path in filter(None, (out, plot)):
+        console.print(f"wrote {path}")
+
+
+def convert(
+    file: File,
+    to: Annotated[
+        str | None,
+        typer.Option(metavar="FORM", help="csv, json, oem or czml; by the name of --out if not given."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Where to; the file's name with the form as its end if not given.")
+    ] = None,
+    epoch: Annotated[
+        str | None,
+        typer.Option(metavar="DATE", help="Date of t = 0 where the scene has none, 2028-11-20T06:30:00."),
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option(help="Axes where the scene has none: ICRF, EME2000, ITRF ...")
+    ] = None,
+    center: Annotated[
+        str | None, typer.Option(help="Body at the origin where the scene has none: EARTH ...")
+    ] = None,
+    time_system: Annotated[
+        str | None,
+        typer.Option("--time-system", help="Scale of --epoch: TDB, TT, TAI or UTC; TDB if not given."),
+    ] = None,
+) -> None:
+    """Write a saved solution as a table (csv, json), a CCSDS OEM, or CZML for a globe."""
+    import dmoc
+    from dmoc.reports import words as report
+
+    if out is None and to is None:
+        raise ValueError("say what to write: --to csv, json, oem or czml, or --out with such an end")
+    target = file.with_suffix(f".{to}") if out is None else out
+    if target.exists() and file.exists() and target.samefile(file):
+        raise ValueError(f"{target} is the solution itself; give another name with --out")
+    dmoc.convert(dmoc.load(file), target, to, epoch, frame, center, time_system)
+    report.console().print(f"wrote {target}")
