@@ -29,7 +29,7 @@ LAYERS = [
     ["missions"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports"],
+    ["studies", "sweeps", "exports", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
     ["cli"],

@@ -29,6 +29,7 @@ from dmoc.cli.options import (
     Source,
     Steps,
     Version,
+    Worth,
     attached,
     ends_at_once,
     fail,
@@ -148,14 +149,14 @@ def simulate(
 
 
 @app.command(epilog="Example: dmoc check flight.nc")
-def check(file: File, source: Source = None, as_json: Json = False) -> None:
+def check(file: File, source: Source = None, worth: Worth = False, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.structure.front import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
         verdict = verify(solution)
-    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
+    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED, with_worth=worth)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")

@@ -86,6 +86,10 @@ Structure = Annotated[
 Impulses = Annotated[
     str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")
 ]
+Worth = Annotated[
+    bool,
+    switch("--worth", help="Also say what every number of the problem is worth: derivatives of the objective."),
+]
 Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]
@@ -199,18 +203,29 @@ def show_answer(
     quiet: bool = False,
     written: Sequence[Path] = (),
     stopped: int = INTERRUPTED,
+    with_worth: bool = False,
 ) -> None:
-    """Print the answer and exit with the code that says what it is worth."""
+    """Print the answer and exit with the code that says how good it is."""
+    found = None
+    if with_worth and solution.optimal:
+        from dmoc.sensitivity.worth import worth
+
+        found = worth(solution)
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        print(report_json.as_text(report_json.solve_object(solution, verdict)))
+        told = report_json.solve_object(solution, verdict)
+        if found is not None:
+            told["worth"] = report_json.worth_object(found)
+        print(report_json.as_text(told))
     else:
         from dmoc.reports import words as report
+        from dmoc.reports.worth import worth_table
 
         if solution.optimal and verdict is not None:
+            more = [] if found is None else [worth_table(found, solution)]
             # A single line stays one, however wide the terminal is.
-            report.console().print(report.answer(solution, verdict, quiet, written), soft_wrap=quiet)
+            report.console().print(report.answer(solution, verdict, quiet, written, more), soft_wrap=quiet)
         else:
             report.console().print(report.failure(solution, quiet, written))
     if not solution.optimal:

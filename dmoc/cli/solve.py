@@ -19,6 +19,7 @@ from dmoc.cli.options import (
     Settings,
     Steps,
     Structure,
+    Worth,
     best_start,
     ends_at_once,
     problem_of,
@@ -61,6 +62,7 @@ def solve(
         bool,
         switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
     ] = False,
+    worth: Worth = False,
     quiet: Quiet = False,
 ) -> None:
     """Solve a problem, check the answer, show both."""
@@ -91,4 +93,5 @@ def solve(
         save_figure(solution, plot, verdict)
     if animate is not None:
         dmoc.animate(solution, animate)
-    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot, animate) if path is not None])
+    written = [path for path in (out, plot, animate) if path is not None]
+    show_answer(solution, verdict, as_json, quiet, written, with_worth=worth)

@@ -11,6 +11,7 @@ from dmoc.reports.verdict import accuracy
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
+    from dmoc.sensitivity.worth import Worth
 
 
 def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
@@ -78,6 +79,20 @@ def _of_mission(solution: Any) -> dict[str, Any]:
             for kick in solution.impulses
         ],
         "primer": {"time": [float(t) for t in times], "length": [float(size) for size in sizes]},
+    }
+
+
+def worth_object(found: dict[str, Worth]) -> dict[str, Any]:
+    """For JSON: of each number its worth, the unit of that, the number itself with its unit, and the range."""
+    return {
+        name: {
+            "value": one.value,
+            "unit": one.unit,
+            "range": None if one.range is None else list(one.range),
+            "number": one.number,
+            "number_unit": one.of,
+        }
+        for name, one in found.items()
     }
 
 
