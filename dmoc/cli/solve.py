@@ -31,6 +31,10 @@ from dmoc.cli.options import (
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
+Compiled = Annotated[
+    bool, switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept.")
+]
+
 
 def solve(
     name: Name,
@@ -58,10 +62,7 @@ def solve(
         typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
     ] = None,
     as_json: Json = False,
-    compiled: Annotated[
-        bool,
-        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
-    ] = False,
+    compiled: Compiled = False,
     worth: Worth = False,
     quiet: Quiet = False,
 ) -> None:

@@ -11,6 +11,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from dmoc.reports.layout import plain_table
+from dmoc.sensitivity.worth import ENDS
 
 if TYPE_CHECKING:
     from dmoc.sensitivity.worth import Worth
@@ -23,8 +24,6 @@ TURN = math.radians(1.0)
 NOTHING = 1e-6
 # So many sentences are printed: those of the numbers that matter most.
 SENTENCES = 5
-# The names of what has a sign of its own begin with these.
-ENDS = ("start_", "goal_")
 
 
 def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
@@ -50,8 +49,10 @@ def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
                 "change these hold is not known."
             )
         )
+    if said:
+        notes += [Text(), Text("To first order:"), *said]
     head = Text("What the numbers of the problem are worth: change of the objective per unit of each", "bold")
-    return Group(head, table, *notes, Text(), Text("To first order:"), *said, Text())
+    return Group(head, *([table] if listed else []), *notes, Text())
 
 
 def sentences(found: dict[str, Worth], steps: dict[str, float], solution: Any) -> list[str]:

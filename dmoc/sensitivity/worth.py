@@ -26,6 +26,13 @@ ALONG_AXES = ("m", "m/s", "N", "rad/s", "N m")
 # The entries of numbers that bound what is free between them, by the ends of their names.
 SPANS = {"durations": ("least", "most"), "start_times": ("earliest", "latest")}
 
+# A vector is one of unit length if it is so but for this [-].
+UNIT = 1e-9
+# A range that ends farther away than both, as a number and times the number itself, has no end.
+FAR, FAR_TIMES = 1e13, 1e6
+# The names of the numbers of both ends begin with these.
+ENDS = ("start_", "goal_")
+
 
 @dataclass(frozen=True)
 class Worth:
@@ -64,7 +71,9 @@ def worth(solution: Any) -> dict[str, Worth]:
     """The derivatives of the objective by all numbers of its problem, from the multipliers.
 
     Numbers are those of start, goal, actuator, zones and other constraints, mass, duration and start time; not
-    those of effects. Nothing is solved again. As the envelope theorem says, the derivative is that of the
+    those of effects, and where links join bodies not those of the ends, which cannot change one by one. A
+    direction changes without its length. Where two limits leave no room between them, as of a thrust that never
+    changes, their sum alone has a meaning. Nothing is solved again. As the envelope theorem says, the derivative is that of the
     Lagrangian at the answer, with unknowns and multipliers fixed (Fiacco 1983, theorem 3.2.2). The range comes
     from one factorisation of the optimality conditions.
 
@@ -86,7 +95,7 @@ def worth(solution: Any) -> dict[str, Worth]:
     made = conditions_of(solution)
     optimum, problem = made.optimum, solution.require_problem()
     cost = problem.objective.unit_with(problem.actuator)
-    entries = list(_entries(optimum))
+    entries = list(_entries(optimum, bool(getattr(problem, "links", ()))))
     ways = np.stack([way for *_, way in entries], axis=1)
     values = optimum.slope @ ways * optimum.cost * optimum.sense
     try:
@@ -96,7 +105,7 @@ def worth(solution: Any) -> dict[str, Worth]:
     found = {}
     for (number, label, at, unit, _), value, room in zip(entries, values, rooms, strict=True):
         name = f"{number.name}.{label}" if label else number.name
-        span = None if room is None else (float(at - room[0]), float(at + room[1]))
+        span = None if room is None else _span(at, *room)
         words = f"{number.term.words.split(';')[0]}{f', {label}' if label else ''}".replace("_", " ")
         found[name] = Worth(name, float(value), per(cost, unit), span, float(at), unit, words)
     return found
@@ -121,7 +130,19 @@ def per(above: str, below: str) -> str:
     return f"{above or '1'}/({below})" if {"/", " "} & set(below) else f"{above or '1'}/{below}"
 
 
-def _entries(optimum: Optimum) -> Iterator[tuple[Number, str, float, str, np.ndarray]]:
+def is_direction(number: Number) -> bool:
+    """Whether its entries are a unit vector or a unit quaternion, whose length has no meaning."""
+    known = number.value.size > 1 and number.term.unit in ("-", "")
+    return known and abs(np.linalg.norm(number.value) - 1.0) < UNIT
+
+
+def _span(at: float, back: float, forth: float) -> tuple[float, float]:
+    """The range of a number; a way that is far beyond any number of this kind is rounding, not a limit."""
+    far = max(FAR, FAR_TIMES * abs(at))
+    return float(at - back) if back < far else -np.inf, float(at + forth) if forth < far else np.inf
+
+
+def _entries(optimum: Optimum, linked: bool) -> Iterator[tuple[Number, str, float, str, np.ndarray]]:
     """Number, label, value, unit and the way all numbers change by one of it, of every entry that is stated."""
     total, first = optimum.matrices[0].shape[1], 0
     for number in optimum.numbers.kept:
@@ -129,12 +150,16 @@ def _entries(optimum: Optimum) -> Iterator[tuple[Number, str, float, str, np.nda
         ways = np.zeros((size, total))
         ways[:, first : first + size] = np.eye(size)
         first += size
+        if linked and number.name.startswith(ENDS):
+            continue
         if number.name.endswith(ATTITUDE.place) and size == 4:
             # Four numbers of length 1 have three ways to change: a turn of the body about each of its axes.
             turns = [0.5 * times(number.value, np.append(0.0, axis)) for axis in np.eye(3)]
             for label, turn in zip(AXES, turns, strict=True):
                 yield number, f"about_{label}", 0.0, "rad", turn @ ways
             continue
+        if is_direction(number):
+            ways -= np.outer(number.value, number.value @ ways)
         labels = _labels(number)
         for label, value, way in zip(labels, number.value, ways, strict=True):
             if not np.isnan(value):
@@ -148,4 +173,5 @@ def _labels(number: Number) -> tuple[str, ...]:
     spans = [labels for ending, labels in SPANS.items() if number.name.endswith(ending)]
     if spans and size == 2:
         return spans[0]
-    return AXES[:size] if size <= 3 and number.term.unit in ALONG_AXES else tuple(map(str, range(size)))
+    axes = size <= 3 and (number.term.unit in ALONG_AXES or is_direction(number))
+    return AXES[:size] if axes else tuple(map(str, range(size)))

@@ -1,0 +1,135 @@
+"""The path for changed numbers of a problem, to first order and without a solve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.basics.arguments import entries, number, short
+from dmoc.basics.quaternions import QUATERNION, normalised
+from dmoc.motion.path import DiscretePath
+from dmoc.nlp.ipopt import Answer
+from dmoc.planners.numbers import Number
+from dmoc.sensitivity.optimum import Optimum
+from dmoc.sensitivity.worth import conditions_of, is_direction
+
+# These numbers have no meaning at zero and below.
+POSITIVE = ("mass", "duration")
+
+
+def predict(solution: Any, **changes: Any) -> Any:
+    """The path that is about optimal where numbers of the problem have other values.
+
+    The optimality conditions of the answer are linearised, with the limits that act; the error is of second order
+    in the changes, until another limit begins to act or one ends to (see the range of `worth`). The
+    factorisation is kept with the solution: the first prediction makes it, each further one takes a small part
+    of a solve. As a guess the path brings its multipliers:
+    `solve(changed problem, order, steps, guess=predict(solution, mass=1.02))`.
+
+    Parameters
+    ----------
+    solution : Solution or MissionSolution
+        A local optimum, with its problem.
+    changes : float or sequence of float
+        New values [SI] by the names that `worth` has without their entries: mass=1.02, goal_position=(2, 0),
+        keep_out_2_radius=1.1.
+
+    Returns
+    -------
+    DiscretePath, or MissionPath of a mission
+
+    Raises
+    ------
+    ValueError
+        If the problem has no such number, or the answer is degenerate, so that its conditions do not say how it
+        moves.
+
+    Notes
+    -----
+    Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear Programming (1983), section 3.2;
+    as in sIPOPT (Pirnay, Lopez-Negrete, Biegler 2012).
+    """
+    made = conditions_of(solution)
+    optimum = made.optimum
+    by = _change(optimum.numbers.kept, changes)
+    moved = made.tangent(by[:, None])
+    lower, upper, *_ = optimum.matrices
+    x = optimum.x + moved.x[:, 0]
+    x = np.clip(x, optimum.bounds[0] + lower @ by, optimum.bounds[1] + upper @ by)
+    lam_x, lam_g = optimum.lam_x + moved.lam_x[:, 0], optimum.lam_g + moved.lam_g[:, 0]
+    answer = Answer(x, lam_x, lam_g, optimum.rows + moved.rows[:, 0], 0.0, "", 0, 0, 0.0)
+    if hasattr(solution.problem, "plan"):
+        return _of_mission(optimum, answer, changes)
+    return _with_stated(optimum, _with_unit_quaternions(optimum.program.path(solution.problem, answer)), changes)
+
+
+def _of_mission(optimum: Optimum, answer: Answer, changes: dict[str, Any]) -> Any:
+    """The path of a mission, whose legs last as long as is stated where that is no unknown."""
+    from dmoc.planners.mission import identifiers
+
+    mission, path = optimum.program.mission, optimum.program.path(answer)
+    legs = []
+    for leg, plan, placed, name in zip(
+        path.legs, mission.plan, optimum.program.legs, identifiers(mission.leg_names), strict=True
+    ):
+        own = f"{name}_duration" if plan.duration is not None else "duration"
+        lasts = leg.duration
+        if own in changes and "duration" not in placed.program.columns:
+            lasts = float(np.ravel(changes[own])[0])
+        legs.append(replace(_with_unit_quaternions(leg), duration=lasts))
+    return replace(path, legs=tuple(legs), near=True)
+
+
+def _change(numbers: list[Number], changes: dict[str, Any]) -> np.ndarray:
+    """By how much all numbers change."""
+    known = {one.name: one for one in numbers}
+    if strange := [name for name in changes if name not in known]:
+        raise ValueError(f"no number is called {short(strange[0])}; there are {', '.join(known)}")
+    if not changes:
+        raise ValueError(f"give a number another value: {', '.join(known)}")
+    parts = []
+    for name, one in known.items():
+        before = np.nan_to_num(one.value)
+        if name not in changes:
+            parts.append(np.zeros(before.size))
+            continue
+        given = changes[name]
+        values = [given] if before.size == 1 and np.ndim(given) == 0 else entries(given)
+        if values is None or len(values) != before.size:
+            raise ValueError(f"{name} has {before.size} entries; got {short(given)}")
+        unit = one.term.unit
+        after = [
+            # An entry that is free stays so.
+            0.0 if np.isnan(stated) else number(name, value, unit, positive=name in POSITIVE)
+            for value, stated in zip(values, one.value, strict=True)
+        ]
+        parts.append((_unit(after, before) if is_direction(one) else np.array(after)) - before)
+    return np.concatenate(parts)
+
+
+def _unit(given: list[float], before: np.ndarray) -> np.ndarray:
+    """A direction or a quaternion of length 1; of a quaternion and its negative, one attitude, the nearer."""
+    length = float(np.linalg.norm(given))
+    if not length:
+        raise ValueError("a direction or an attitude must not be zero")
+    unit = np.array(given) / length
+    return -unit if len(unit) == QUATERNION and unit @ before < 0 else unit
+
+
+def _with_unit_quaternions(path: DiscretePath) -> DiscretePath:
+    position = path.position.copy()
+    for at in path.coordinates.quaternions:
+        position[:, at] = normalised(position[:, at])
+    return replace(path, position=position)
+
+
+def _with_stated(optimum: Optimum, path: DiscretePath, changes: dict[str, Any]) -> DiscretePath:
+    """A path of a transfer with the duration and the mass where these are no unknowns of it."""
+    columns = optimum.program.columns
+    if "duration" in changes and "duration" not in columns:
+        path = replace(path, duration=float(np.ravel(changes["duration"])[0]))
+    if "mass" in changes and "mass" not in columns:
+        path = replace(path, mass=np.full(len(path.mass), float(np.ravel(changes["mass"])[0])))
+    return path
