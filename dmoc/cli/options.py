@@ -220,10 +220,9 @@ def show_answer(
         print(report_json.as_text(told))
     else:
         from dmoc.reports import words as report
-        from dmoc.reports.worth import worth_table
 
         if solution.optimal and verdict is not None:
-            more = [] if found is None else [worth_table(found, solution)]
+            more = [] if found is None else _worth_lines(found, solution)
             # A single line stays one, however wide the terminal is.
             report.console().print(report.answer(solution, verdict, quiet, written, more), soft_wrap=quiet)
         else:
@@ -231,6 +230,12 @@ def show_answer(
     if not solution.optimal:
         raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
     raise typer.Exit(SOLVED if solution.success and verdict is not None and verdict.ok else CHECK_FAILED)
+
+
+def _worth_lines(found: dict, solution: Any) -> list:
+    from dmoc.reports.worth import worth_table
+
+    return [worth_table(found, solution)]
 
 
 def warn(message: str) -> None:

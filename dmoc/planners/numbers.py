@@ -74,7 +74,7 @@ class Numbers:
         """Those of a transfer."""
 
         def taken(problem: TransferProblem) -> list[np.ndarray]:
-            return [*nlp.bounds(problem)[:2], nlp.parameters(problem)]
+            return [*nlp.column_bounds(problem), nlp.parameters(problem)]
 
         return cls(nlp.problem, numbers_of(nlp.problem), taken)
 

@@ -46,7 +46,7 @@ def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
         notes.append(
             Text(
                 "The answer is degenerate: another path, or other multipliers, are as good. For how large a "
-                "change these hold is not known."
+                "change the values hold is not known."
             )
         )
     if said:

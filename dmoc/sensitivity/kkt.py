@@ -13,11 +13,15 @@ from dmoc.sensitivity.optimum import Optimum
 
 # What solves the linear system is right if it leaves this part of the right-hand side [-].
 LEFT = 1e-6
-# An answer that moves by more than this for a number's change that alone moves rows and bounds by 1 has no
-# direction to move in: the system is singular but for rounding [-].
-BEYOND = 1e9
+# Where a right-hand side of size 1 moves the answer by more than this, the system is singular but for rounding;
+# regular ones of scaled problems move it by 1e2 to 2e9, singular ones by 1e14 and more [-].
+BEYOND = 1e10
 # Refinements of a solution of the linear system: each takes the error of the factorisation once more away.
 REFINEMENTS = 2
+SINGULAR = (
+    "the answer is degenerate: another path, or other multipliers, are as good, so that its optimality "
+    "conditions are singular and do not say how it moves"
+)
 
 
 class SingularError(ValueError):
@@ -70,9 +74,14 @@ class ActiveSet:
         H = made.hessian[self.free][:, self.free]
         matrix = sparse.bmat([[H, J.T], [J, None]], format="csc")
         try:
-            return matrix, splu(matrix)
+            factors = splu(matrix)
         except RuntimeError as error:
-            raise SingularError("the optimality conditions are singular at this answer") from error
+            raise SingularError(SINGULAR) from error
+        # Any right-hand side does that a singular direction is not likely to be at right angles to.
+        probe = factors.solve(np.cos(np.arange(matrix.shape[0]) ** 2.0))
+        if not np.abs(probe).max(initial=0.0) <= BEYOND:
+            raise SingularError(SINGULAR)
+        return matrix, factors
 
     def tangent(self, changes: np.ndarray) -> Tangent:
         """The derivative of the answer along changes of all numbers, shape (numbers, directions).
@@ -109,8 +118,8 @@ class ActiveSet:
             found += factors.solve(right - matrix @ found)
         left = np.abs(right - matrix @ found).max(initial=0.0)
         size = np.abs(right).max(initial=0.0)
-        if not left <= LEFT * size or not np.abs(found).max(initial=0.0) <= BEYOND * max(size, 1.0):
-            raise SingularError("the optimality conditions are singular at this answer, but for rounding")
+        if not left <= LEFT * size:
+            raise SingularError(SINGULAR)
         return found
 
     def room(self, moving: Tangent, changes: np.ndarray) -> np.ndarray:

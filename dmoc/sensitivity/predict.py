@@ -22,8 +22,8 @@ POSITIVE = ("mass", "duration")
 def predict(solution: Any, **changes: Any) -> Any:
     """The path that is about optimal where numbers of the problem have other values.
 
-    The optimality conditions of the answer are linearised, with the limits that act; the error is of second order
-    in the changes, until another limit begins to act or one ends to (see the range of `worth`). The
+    The optimality conditions of the answer are linearised, with the limits that act; the error is of second
+    order in the changes, until another limit begins to act or one ends to (see the range of `worth`). The
     factorisation is kept with the solution: the first prediction makes it, each further one takes a small part
     of a solve. As a guess the path brings its multipliers:
     `solve(changed problem, order, steps, guess=predict(solution, mass=1.02))`.
@@ -53,7 +53,10 @@ def predict(solution: Any, **changes: Any) -> Any:
     """
     made = conditions_of(solution)
     optimum = made.optimum
-    by = _change(optimum.numbers.kept, changes)
+    numbers = optimum.numbers.kept
+    wanted = _checked(numbers, changes)
+    by = np.concatenate([wanted.get(one.name, one.value) - one.value for one in numbers])
+    by = np.nan_to_num(by)
     moved = made.tangent(by[:, None])
     lower, upper, *_ = optimum.matrices
     x = optimum.x + moved.x[:, 0]
@@ -61,11 +64,12 @@ def predict(solution: Any, **changes: Any) -> Any:
     lam_x, lam_g = optimum.lam_x + moved.lam_x[:, 0], optimum.lam_g + moved.lam_g[:, 0]
     answer = Answer(x, lam_x, lam_g, optimum.rows + moved.rows[:, 0], 0.0, "", 0, 0, 0.0)
     if hasattr(solution.problem, "plan"):
-        return _of_mission(optimum, answer, changes)
-    return _with_stated(optimum, _with_unit_quaternions(optimum.program.path(solution.problem, answer)), changes)
+        return _of_mission(optimum, answer, wanted)
+    path = _with_unit_quaternions(optimum.program.path(solution.problem, answer))
+    return _with_stated(optimum, path, wanted)
 
 
-def _of_mission(optimum: Optimum, answer: Answer, changes: dict[str, Any]) -> Any:
+def _of_mission(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) -> Any:
     """The path of a mission, whose legs last as long as is stated where that is no unknown."""
     from dmoc.planners.mission import identifiers
 
@@ -76,37 +80,32 @@ def _of_mission(optimum: Optimum, answer: Answer, changes: dict[str, Any]) -> An
     ):
         own = f"{name}_duration" if plan.duration is not None else "duration"
         lasts = leg.duration
-        if own in changes and "duration" not in placed.program.columns:
-            lasts = float(np.ravel(changes[own])[0])
+        if own in wanted and "duration" not in placed.program.columns:
+            lasts = float(wanted[own][0])
         legs.append(replace(_with_unit_quaternions(leg), duration=lasts))
     return replace(path, legs=tuple(legs), near=True)
 
 
-def _change(numbers: list[Number], changes: dict[str, Any]) -> np.ndarray:
-    """By how much all numbers change."""
+def _checked(numbers: list[Number], changes: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The values that are given, as columns; what is given for an entry that is free has no meaning."""
     known = {one.name: one for one in numbers}
     if strange := [name for name in changes if name not in known]:
         raise ValueError(f"no number is called {short(strange[0])}; there are {', '.join(known)}")
     if not changes:
         raise ValueError(f"give a number another value: {', '.join(known)}")
-    parts = []
-    for name, one in known.items():
-        before = np.nan_to_num(one.value)
-        if name not in changes:
-            parts.append(np.zeros(before.size))
-            continue
-        given = changes[name]
-        values = [given] if before.size == 1 and np.ndim(given) == 0 else entries(given)
-        if values is None or len(values) != before.size:
-            raise ValueError(f"{name} has {before.size} entries; got {short(given)}")
-        unit = one.term.unit
+    found = {}
+    for name, given in changes.items():
+        one, values = known[name], entries(given)
+        if values is None and one.value.size == 1:
+            values = (given,)
+        if values is None or len(values) != one.value.size:
+            raise ValueError(f"{name} has {one.value.size} entries; got {short(given)}")
         after = [
-            # An entry that is free stays so.
-            0.0 if np.isnan(stated) else number(name, value, unit, positive=name in POSITIVE)
+            0.0 if np.isnan(stated) else number(name, value, one.term.unit, positive=name in POSITIVE)
             for value, stated in zip(values, one.value, strict=True)
         ]
-        parts.append((_unit(after, before) if is_direction(one) else np.array(after)) - before)
-    return np.concatenate(parts)
+        found[name] = _unit(after, one.value) if is_direction(one) else np.array(after)
+    return found
 
 
 def _unit(given: list[float], before: np.ndarray) -> np.ndarray:
@@ -125,11 +124,11 @@ def _with_unit_quaternions(path: DiscretePath) -> DiscretePath:
     return replace(path, position=position)
 
 
-def _with_stated(optimum: Optimum, path: DiscretePath, changes: dict[str, Any]) -> DiscretePath:
+def _with_stated(optimum: Optimum, path: DiscretePath, wanted: dict[str, np.ndarray]) -> DiscretePath:
     """A path of a transfer with the duration and the mass where these are no unknowns of it."""
     columns = optimum.program.columns
-    if "duration" in changes and "duration" not in columns:
-        path = replace(path, duration=float(np.ravel(changes["duration"])[0]))
-    if "mass" in changes and "mass" not in columns:
-        path = replace(path, mass=np.full(len(path.mass), float(np.ravel(changes["mass"])[0])))
+    if "duration" in wanted and "duration" not in columns:
+        path = replace(path, duration=float(wanted["duration"][0]))
+    if "mass" in wanted and "mass" not in columns:
+        path = replace(path, mass=np.full(len(path.mass), wanted["mass"][0]))
     return path

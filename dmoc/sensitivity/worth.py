@@ -73,9 +73,12 @@ def worth(solution: Any) -> dict[str, Worth]:
     Numbers are those of start, goal, actuator, zones and other constraints, mass, duration and start time; not
     those of effects, and where links join bodies not those of the ends, which cannot change one by one. A
     direction changes without its length. Where two limits leave no room between them, as of a thrust that never
-    changes, their sum alone has a meaning. Nothing is solved again. As the envelope theorem says, the derivative is that of the
-    Lagrangian at the answer, with unknowns and multipliers fixed (Fiacco 1983, theorem 3.2.2). The range comes
-    from one factorisation of the optimality conditions.
+    changes, their sum alone has a meaning.
+
+    Nothing is solved again. As the envelope theorem says, the derivative is that of the Lagrangian at the
+    answer, with unknowns and multipliers fixed (Fiacco 1983, theorem 3.2.2). The range comes from one
+    factorisation of the optimality conditions; on a finer mesh more nodes meet a limit, one after the other, so that it is
+    shorter there, while values hardly change.
 
     Parameters
     ----------
@@ -133,7 +136,7 @@ def per(above: str, below: str) -> str:
 def is_direction(number: Number) -> bool:
     """Whether its entries are a unit vector or a unit quaternion, whose length has no meaning."""
     known = number.value.size > 1 and number.term.unit in ("-", "")
-    return known and abs(np.linalg.norm(number.value) - 1.0) < UNIT
+    return known and bool(abs(np.linalg.norm(number.value) - 1.0) < UNIT)
 
 
 def _span(at: float, back: float, forth: float) -> tuple[float, float]:

@@ -412,6 +412,7 @@ def test_every_constructor_is_tried():
         "Solution",
         "SolveError",
         "Trajectory",
+        "Worth",
     }
     assert made - abstract - without_arguments - results == set(MAKES)
 
@@ -445,6 +446,7 @@ CALLS = {
         {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
     ),
     "load": (dmoc.load, {"path": "nothing.nc"}),
+    "predict": (dmoc.predict, {"mass": 2.0, "goal_position": (1.0, 1.0)}),
     "save_figure": (save_figure, {"path": "x.svg"}),
     "simulate": (
         simulate,
@@ -474,6 +476,7 @@ CALLS = {
     "solve to a tolerance": (solve, {"problem": HERE, "tol": 1e-2, "order": 4, "steps": 4}),
     "transcribe": (transcribe, {"problem": HERE, "steps": 4, "order": 2, "mesh": None, "guess": None}),
     "verify": (verify, {"problem": HERE}),
+    "worth": (dmoc.worth, {}),
 }
 # None means "not given"; what such a function raises in the middle of a solve is what solve raises
 LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
@@ -483,7 +486,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("verify", "save_figure"):
+    if name in ("verify", "save_figure", "worth", "predict"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:
