@@ -128,6 +128,8 @@ if TYPE_CHECKING:
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.scene.mission import Mission as Mission
     from dmoc.scene.problem import TransferProblem as TransferProblem
+    from dmoc.sensitivity.dispersion import Dispersion as Dispersion
+    from dmoc.sensitivity.dispersion import disperse as disperse
     from dmoc.sensitivity.predict import predict as predict
     from dmoc.sensitivity.worth import Worth as Worth
     from dmoc.sensitivity.worth import worth as worth

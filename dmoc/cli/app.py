@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import disperse as disperse_command
 from dmoc.cli import new as new_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -242,6 +243,10 @@ def doctor() -> None:
 
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (
+        disperse_command.disperse,
+        "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
     (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),

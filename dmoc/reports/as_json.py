@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.plain import finite
@@ -11,6 +12,7 @@ from dmoc.reports.verdict import accuracy
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
+    from dmoc.sensitivity.dispersion import Dispersion
     from dmoc.sensitivity.worth import Worth
 
 
@@ -93,6 +95,23 @@ def worth_object(found: dict[str, Worth]) -> dict[str, Any]:
             "number_unit": one.of,
         }
         for name, one in found.items()
+    }
+
+
+def dispersion_object(found: Dispersion, solution: Any) -> dict[str, Any]:
+    """For JSON: spread at the end, miss of the planned end, and of each limit how often it is broken."""
+    axes = found.position.shape[2]
+    spread = {
+        name: {"position": list(map(float, sigma[-1][:axes])), "velocity": list(map(float, sigma[-1][axes:]))}
+        for name, sigma in (("linear", found.sigma), ("sampled", found.sampled_sigma))
+    }
+    return {
+        "problem": solution.provenance.problem_name,
+        "samples": found.samples,
+        "seed": found.seed,
+        "sigma_at_end": spread,
+        "miss": [{"part": part, "position": place, "velocity": speed} for part, place, speed in found.miss],
+        "limits": {name: asdict(chance) for name, chance in found.chances.items()},
     }
 
 

@@ -109,7 +109,7 @@ class Optimum:
 
         By the envelope theorem that of the Lagrangian: grad_p (f + lam_g . g) through parameters, and through a
         bound minus its multiplier (Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear
-        Programming, 1983, theorem 3.2.2).
+        Programming, 1983, chapter 3).
         """
         by_p = np.zeros(len(self.p))
         for block, given in self._given():

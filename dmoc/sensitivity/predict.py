@@ -48,7 +48,7 @@ def predict(solution: Any, **changes: Any) -> Any:
 
     Notes
     -----
-    Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear Programming (1983), section 3.2;
+    Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear Programming (1983), chapter 3;
     as in sIPOPT (Pirnay, Lopez-Negrete, Biegler 2012).
     """
     made = conditions_of(solution)

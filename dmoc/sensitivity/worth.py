@@ -76,9 +76,9 @@ def worth(solution: Any) -> dict[str, Worth]:
     changes, their sum alone has a meaning.
 
     Nothing is solved again. As the envelope theorem says, the derivative is that of the Lagrangian at the
-    answer, with unknowns and multipliers fixed (Fiacco 1983, theorem 3.2.2). The range comes from one
-    factorisation of the optimality conditions; on a finer mesh more nodes meet a limit, one after the other, so that it is
-    shorter there, while values hardly change.
+    answer, with unknowns and multipliers fixed (Fiacco 1983, chapter 3). The range comes from one
+    factorisation of the optimality conditions; on a finer mesh more nodes meet a limit, one after the other, so
+    that it is shorter there, while values hardly change.
 
     Parameters
     ----------

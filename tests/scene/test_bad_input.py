@@ -403,6 +403,7 @@ def test_every_constructor_is_tried():
     results = {
         "Body",
         "Check",
+        "Dispersion",
         "Evidence",
         "Formulation",
         "MissionSolution",
@@ -441,6 +442,10 @@ def test_constructors_and_any_value(name, data):
 
 # Solutions of 4 steps are quick, whatever else is asked for.
 CALLS = {
+    "disperse": (
+        dmoc.disperse,
+        {"start": (0.1, 0.1), "force": 0.1, "pointing": 0.0, "mass": 0.1, "samples": 3, "seed": 1},
+    ),
     "drift": (
         dmoc.drift,
         {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
@@ -486,7 +491,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("verify", "save_figure", "worth", "predict"):
+    if name in ("verify", "save_figure", "worth", "predict", "disperse"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:
@@ -505,6 +510,7 @@ VERBS = {
     ),
     "show": (["point_to_point"], ["--set"]),
     "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls"]),
+    "disperse": (["nothing.nc"], ["--start", "--force", "--pointing", "--samples", "--seed", "--plot"]),
     "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
     "check": (["nothing.nc"], ["--problem"]),
     "plot": (["nothing.nc"], ["--out", "--problem"]),
