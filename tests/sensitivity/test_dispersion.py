@@ -191,7 +191,7 @@ def test_bad_input():
         disperse(solve(TransferProblem(**(PLAIN | line)), steps=4), pointing=0.1)
     for name in ("reorientation", "pendulum", "gates"):
         problem = load_problem(name).make()
-        with pytest.raises(ValueError, match="disperse (takes|flies)"):
+        with pytest.raises(ValueError, match=r"disperse (takes|flies)"):
             disperse(solve(getattr(problem, "alone", None) or problem))
     with pytest.raises(ValueError, match="solution must be a"):
         disperse(answer.path)
