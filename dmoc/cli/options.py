@@ -106,8 +106,13 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
 
 
 def transfer_of(name: str, settings: list[str] | None, verb: str) -> Any:
-    """The problem of a verb that has no meaning for a mission of several legs."""
+    """The problem of a verb that has no meaning for a mission of several legs or a team of bodies."""
     problem = problem_of(name, settings)[1]
+    if hasattr(problem, "together"):
+        raise ValueError(
+            f"dmoc {verb} takes a transfer, but {name} is a team of bodies; state the body that you mean as a "
+            "TransferProblem"
+        )
     if hasattr(problem, "plan"):
         raise ValueError(
             f"dmoc {verb} takes a transfer, but {name} is a mission of legs; state the leg that you mean as a "
@@ -121,7 +126,11 @@ def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: 
     from dmoc.reports import words as report
     from dmoc.reports.tables import optima_table
 
-    if hasattr(problem, "plan"):
+    if hasattr(problem, "together"):
+        from dmoc.teams.optima import team_optima
+
+        found = team_optima(problem, starts, order, hold, guess)
+    elif hasattr(problem, "plan"):
         from dmoc.studies.optima import mission_optima
 
         found = mission_optima(problem, starts, order, hold, guess)
@@ -206,36 +215,27 @@ def show_answer(
     with_worth: bool = False,
 ) -> None:
     """Print the answer and exit with the code that says how good it is."""
-    found = None
+    found: tuple = ()
     if with_worth and solution.optimal:
-        from dmoc.sensitivity.worth import worth
+        from dmoc.reports.worth import worth_told
 
-        found = worth(solution)
+        found = worth_told(solution)
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        told = report_json.solve_object(solution, verdict)
-        if found is not None:
-            told["worth"] = report_json.worth_object(found)
-        print(report_json.as_text(told))
+        more = {"worth": found[0]} if found else {}
+        print(report_json.as_text(report_json.solve_object(solution, verdict) | more))
     else:
         from dmoc.reports import words as report
 
         if solution.optimal and verdict is not None:
-            more = [] if found is None else _worth_lines(found, solution)
             # A single line stays one, however wide the terminal is.
-            report.console().print(report.answer(solution, verdict, quiet, written, more), soft_wrap=quiet)
+            report.console().print(report.answer(solution, verdict, quiet, written, found[1:]), soft_wrap=quiet)
         else:
             report.console().print(report.failure(solution, quiet, written))
     if not solution.optimal:
         raise typer.Exit(stopped if solution.status == "stopped" else NOT_SOLVED)
     raise typer.Exit(SOLVED if solution.success and verdict is not None and verdict.ok else CHECK_FAILED)
-
-
-def _worth_lines(found: dict, solution: Any) -> list:
-    from dmoc.reports.worth import worth_table
-
-    return [worth_table(found, solution)]
 
 
 def warn(message: str) -> None:

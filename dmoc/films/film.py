@@ -46,6 +46,8 @@ def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frame
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
+    if hasattr(solution, "members"):
+        raise ValueError("a team of bodies has no moving picture yet; animate(solution.members[0], path) has")
     mission = hasattr(solution, "legs")
     of_kind("solution", solution, MissionSolution if mission else Solution)
     check_target(path)
@@ -62,12 +64,38 @@ def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frame
     with matplotlib.rc_context(SETTINGS), whole_file(path) as temporary:
         page = Figure(figsize=SIZE)
         film = _Film(page, scenery(solution) if mission else solution, scene)  # type: ignore[arg-type]
-        moving = as_path(path).suffix.lower() == ".mp4"
-        writer: Any = animation.FFMpegWriter(fps=RATE) if moving else animation.PillowWriter(fps=RATE)
+        if as_path(path).suffix.lower() == ".gif":
+            _write_gif(film, page, temporary, frames)
+            return
+        writer: Any = animation.FFMpegWriter(fps=RATE)
         with writer.saving(page, str(temporary), DOTS):
             for frame in range(frames):
                 film.show(frame)
                 writer.grab_frame()
+
+
+def _write_gif(film: _Film, page: Any, target: Any, frames: int) -> None:
+    """Draw what stands still once, and only what moves for each frame."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    page.set_dpi(DOTS)
+    canvas = FigureCanvasAgg(page)
+    for artist in film.moving:
+        artist.set_animated(True)
+    canvas.draw()
+    still = canvas.copy_from_bbox(page.bbox)
+    images = []
+    for frame in range(frames):
+        canvas.restore_region(still)
+        film.show(frame)
+        for artist in film.moving:
+            film.axes.draw_artist(artist)
+        images.append(Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
+    # One palette for all frames: that of the last, where all there is has come into view.
+    palette = images[-1].quantize(255)
+    images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    images[0].save(target, save_all=True, append_images=images[1:], duration=1000 // RATE, loop=0)
 
 
 def check_target(path: str | os.PathLike) -> None:
@@ -129,6 +157,10 @@ class _Film:
             page.legend(*zip(*named, strict=True), loc="lower center", ncol=columns)
         if not space:
             page.subplots_adjust(bottom=0.12 + 0.05 * rows)
+        self.title = self.axes.set_title("", loc="left")
+        lines = self.behind, self.kicks, self.links, self.triads, self.pushes, self.bodies
+        # All that is not the same in every frame, from what is behind to what is before it.
+        self.moving = [*(line for group in lines for line in group), self.title]
 
     def _surround(self, solution: Solution, space: bool) -> None:
         """Zones and attractors, and a view that holds all that moves."""
@@ -180,4 +212,4 @@ class _Film:
         for lines, points in moving:
             for line, known in zip(lines, points, strict=True):
                 self._move(line, known[min(frame, len(known) - 1)])
-        self.axes.set_title(f"t = {scene.times[frame] / self.late:.2f} {self.late_unit}", loc="left")
+        self.title.set_text(f"t = {scene.times[frame] / self.late:.2f} {self.late_unit}")

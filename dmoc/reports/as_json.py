@@ -49,6 +49,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             for check in listed
         },
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
+        **(_of_team(solution) if hasattr(solution, "members") else {}),
     }
 
 
@@ -81,6 +82,25 @@ def _of_mission(solution: Any) -> dict[str, Any]:
             for kick in solution.impulses
         ],
         "primer": {"time": [float(t) for t in times], "length": [float(size) for size in sizes]},
+    }
+
+
+def _of_team(solution: Any) -> dict[str, Any]:
+    """The bodies, and the least distance of each two of them at the nodes."""
+    names = solution.names
+    return {
+        # All bodies share them.
+        "nodes": len(solution.time),
+        "bodies": [
+            {"name": name, "cost": float(one.objective), "final_mass": float(one.final_mass)}
+            for name, one in zip(names, solution.members, strict=True)
+        ],
+        "distances": [
+            {"between": [a, b], "least": float(apart.min()), "at": float(solution.time[apart.argmin()])}
+            for i, a in enumerate(names)
+            for b in names[i + 1 :]
+            for apart in [solution.distance(a, b)]
+        ],
     }
 
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from dmoc.reports.as_json import worth_object
 from dmoc.reports.layout import plain_table
-from dmoc.sensitivity.worth import ENDS
-
-if TYPE_CHECKING:
-    from dmoc.sensitivity.worth import Worth
+from dmoc.sensitivity.worth import ENDS, Worth, worth
 
 # A change is this part of the number, or of the size of its kind, rounded down to 1, 2 or 5 of a decimal [-].
 CHANGE = 0.01
@@ -24,6 +22,12 @@ TURN = math.radians(1.0)
 NOTHING = 1e-6
 # So many sentences are printed: those of the numbers that matter most.
 SENTENCES = 5
+
+
+def worth_told(solution: Any) -> tuple[dict[str, Any], RenderableType]:
+    """What the numbers of a solution are worth, for JSON and as a table."""
+    found = worth(solution)
+    return worth_object(found), worth_table(found, solution)
 
 
 def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
