@@ -12,7 +12,7 @@ from rich.text import Text
 
 from dmoc.reports.as_json import worth_object
 from dmoc.reports.layout import plain_table
-from dmoc.sensitivity.worth import ENDS, Worth, worth
+from dmoc.sensitivity.worth import Worth, is_of_end, worth
 
 # A change is this part of the number, or of the size of its kind, rounded down to 1, 2 or 5 of a decimal [-].
 CHANGE = 0.01
@@ -74,7 +74,7 @@ def sentences(found: dict[str, Worth], steps: dict[str, float], solution: Any) -
         more = (one.value > 0) == maximised
         size = "1 degree" if one.of == "rad" else f"{step:g} {one.of}".removesuffix("-").strip()
         # More of a coordinate that is negative might be read as further from zero.
-        signed = name.startswith(ENDS) or "." in name
+        signed = is_of_end(name) or "." in name
         change = f"{'+' if more else '-'}{size}" if signed else f"{size} {'more' if more else 'less'}"
         share = f" ({100 * effect / abs(solution.objective):.2g} %)" if solution.objective else ""
         verb, words = "gains" if maximised else "saves", re.sub(r" \(\w+\)", "", one.words)

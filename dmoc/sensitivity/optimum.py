@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +16,7 @@ from dmoc.basics.memory import Shelf
 from dmoc.nlp.assembly import Block, Kernel
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
-from dmoc.planners.numbers import Numbers
+from dmoc.planners.numbers import Numbers, numbers_of_team
 
 # The derivatives by parameters of so many kernels are held in this process.
 _BY_PARAMETERS = Shelf(50)
@@ -47,8 +47,8 @@ class Optimum:
 
     @classmethod
     def of(cls, solution: Any, problem: Any) -> Optimum:
-        """That of a solution, of a transfer or a mission, with its problem."""
-        if hasattr(problem, "plan"):
+        """That of a solution, of a transfer, a mission or a team, with its problem."""
+        if hasattr(problem, "plan") or hasattr(problem, "members"):
             return cls._of_mission(solution, problem)
         path = solution.path
         nlp, blocks = unassembled(problem, path, units_of(problem, path))
@@ -72,13 +72,20 @@ class Optimum:
         from dmoc.missions.program import MissionProgram
         from dmoc.planners.mission import MissionPlanner, identifiers
 
-        path = solution.path
-        program = MissionProgram.of(mission, mission.stretches, path)
+        path, names = solution.path, identifiers(mission.leg_names)
+        if hasattr(mission, "members"):
+            from dmoc.teams.program import TeamProgram
+
+            program: MissionProgram = TeamProgram.of(mission, mission.stretches, path)
+            numbers = Numbers(mission, numbers_of_team(mission, names), partial(_of_team, program))
+        else:
+            program = MissionProgram.of(mission, mission.stretches, path)
+            numbers = MissionPlanner(program, path, (), names).numbers
         return cls(
             program,
             path,
             program.blocks,
-            MissionPlanner(program, path, (), identifiers(mission.leg_names)).numbers,
+            numbers,
             program.pack(path),
             program.parameters(),
             *program.multipliers(path),
@@ -207,6 +214,16 @@ class Optimum:
                     np.ones((1, block.count)),
                 ),
             )
+
+
+def _of_team(program: Any, twin: Any) -> list[np.ndarray]:
+    """Bounds and parameters of a team that differs in numbers, unchecked."""
+    legs = [
+        replace(placed, program=replace(placed.program, problem=member))
+        for placed, member in zip(program.legs, twin.members, strict=True)
+    ]
+    changed = replace(program, mission=twin, legs=tuple(legs))
+    return [*changed.bounds(), changed.parameters()]
 
 
 def by_parameters(kernel: Kernel) -> ca.Function:

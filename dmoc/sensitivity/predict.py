@@ -11,6 +11,7 @@ from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import QUATERNION, normalised
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.ipopt import Answer
+from dmoc.nlp.layout import Layout
 from dmoc.planners.numbers import Number
 from dmoc.sensitivity.optimum import Optimum
 from dmoc.sensitivity.worth import conditions_of, is_direction
@@ -30,7 +31,7 @@ def predict(solution: Any, **changes: Any) -> Any:
 
     Parameters
     ----------
-    solution : Solution or MissionSolution
+    solution : Solution, MissionSolution or TeamSolution
         A local optimum, with its problem.
     changes : float or sequence of float
         New values [SI] by the names that `worth` has without their entries: mass=1.02, goal_position=(2, 0),
@@ -38,7 +39,7 @@ def predict(solution: Any, **changes: Any) -> Any:
 
     Returns
     -------
-    DiscretePath, or MissionPath of a mission
+    DiscretePath, or MissionPath of a mission, TeamPath of a team
 
     Raises
     ------
@@ -63,10 +64,12 @@ def predict(solution: Any, **changes: Any) -> Any:
     x = np.clip(x, optimum.bounds[0] + lower @ by, optimum.bounds[1] + upper @ by)
     lam_x, lam_g = optimum.lam_x + moved.lam_x[:, 0], optimum.lam_g + moved.lam_g[:, 0]
     answer = Answer(x, lam_x, lam_g, optimum.rows + moved.rows[:, 0], 0.0, "", 0, 0, 0.0)
+    if hasattr(solution.problem, "members"):
+        return _of_team(optimum, answer, wanted)
     if hasattr(solution.problem, "plan"):
         return _of_mission(optimum, answer, wanted)
     path = _with_unit_quaternions(optimum.program.path(solution.problem, answer))
-    return _with_stated(optimum, path, wanted)
+    return _with_stated(optimum.program.columns, path, wanted)
 
 
 def _of_mission(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) -> Any:
@@ -84,6 +87,23 @@ def _of_mission(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray])
             lasts = float(wanted[own][0])
         legs.append(replace(_with_unit_quaternions(leg), duration=lasts))
     return replace(path, legs=tuple(legs), near=True)
+
+
+def _of_team(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) -> Any:
+    """The paths of all bodies."""
+    from dmoc.planners.mission import identifiers
+
+    team, path = optimum.program.mission, optimum.program.path(answer)
+    legs = []
+    for leg, placed, name in zip(path.legs, optimum.program.legs, identifiers(team.leg_names), strict=True):
+        own = {
+            one: wanted[long]
+            for one, long in (("duration", "duration"), ("mass", f"{name}_mass"))
+            if long in wanted
+        }
+        legs.append(_with_stated(placed.program.columns, _with_unit_quaternions(leg), own))
+    begins = wanted.get("start_time", np.array(path.begins[:1]))
+    return replace(path, legs=tuple(legs), begins=(float(begins[0]),) * len(legs))
 
 
 def _checked(numbers: list[Number], changes: dict[str, Any]) -> dict[str, np.ndarray]:
@@ -124,9 +144,8 @@ def _with_unit_quaternions(path: DiscretePath) -> DiscretePath:
     return replace(path, position=position)
 
 
-def _with_stated(optimum: Optimum, path: DiscretePath, wanted: dict[str, np.ndarray]) -> DiscretePath:
+def _with_stated(columns: Layout, path: DiscretePath, wanted: dict[str, np.ndarray]) -> DiscretePath:
     """A path of a transfer with the duration and the mass where these are no unknowns of it."""
-    columns = optimum.program.columns
     if "duration" in wanted and "duration" not in columns:
         path = replace(path, duration=float(wanted["duration"][0]))
     if "mass" in wanted and "mass" not in columns:

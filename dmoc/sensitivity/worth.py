@@ -28,9 +28,10 @@ SPANS = {"durations": ("least", "most"), "start_times": ("earliest", "latest")}
 
 # A vector is one of unit length if it is so but for this [-].
 UNIT = 1e-9
-# A range that ends farther away than both, as a number and times the number itself, has no end.
-FAR, FAR_TIMES = 1e13, 1e6
-# The names of the numbers of both ends begin with these.
+# A range that ends farther away than so many times the number has no end; nor, of a number that is zero, one that
+# ends farther away than this.
+FAR_TIMES, FAR = 1e6, 1e13
+# The names of the numbers of both ends begin with these, of a team behind the name of a body.
 ENDS = ("start_", "goal_")
 
 
@@ -73,7 +74,7 @@ def worth(solution: Any) -> dict[str, Worth]:
     Numbers are those of start, goal, actuator, zones and other constraints, mass, duration and start time; not
     those of effects, and where links join bodies not those of the ends, which cannot change one by one. A
     direction changes without its length. Where two limits leave no room between them, as of a thrust that never
-    changes, their sum alone has a meaning.
+    changes, their sum alone has a meaning. Of a team not what it says `together`.
 
     Nothing is solved again. As the envelope theorem says, the derivative is that of the Lagrangian at the
     answer, with unknowns and multipliers fixed (Fiacco 1983, chapter 3). The range comes from one
@@ -82,7 +83,7 @@ def worth(solution: Any) -> dict[str, Worth]:
 
     Parameters
     ----------
-    solution : Solution or MissionSolution
+    solution : Solution, MissionSolution or TeamSolution
         A local optimum, with its problem.
 
     Returns
@@ -98,7 +99,7 @@ def worth(solution: Any) -> dict[str, Worth]:
     made = conditions_of(solution)
     optimum, problem = made.optimum, solution.require_problem()
     cost = problem.objective.unit_with(problem.actuator)
-    entries = list(_entries(optimum, bool(getattr(problem, "links", ()))))
+    entries = list(_entries(optimum, _linked(problem)))
     ways = np.stack([way for *_, way in entries], axis=1)
     values = optimum.slope @ ways * optimum.cost * optimum.sense
     try:
@@ -139,9 +140,19 @@ def is_direction(number: Number) -> bool:
     return known and bool(abs(np.linalg.norm(number.value) - 1.0) < UNIT)
 
 
+def is_of_end(name: str) -> bool:
+    """Whether a number is one of the start or of the goal."""
+    return any(end in name for end in ENDS)
+
+
+def _linked(problem: Any) -> bool:
+    """Whether links join bodies of a problem."""
+    return any(getattr(one, "links", ()) for one in (problem, *getattr(problem, "members", ())))
+
+
 def _span(at: float, back: float, forth: float) -> tuple[float, float]:
     """The range of a number; a way that is far beyond any number of this kind is rounding, not a limit."""
-    far = max(FAR, FAR_TIMES * abs(at))
+    far = FAR_TIMES * abs(at) or FAR
     return float(at - back) if back < far else -np.inf, float(at + forth) if forth < far else np.inf
 
 
@@ -153,7 +164,7 @@ def _entries(optimum: Optimum, linked: bool) -> Iterator[tuple[Number, str, floa
         ways = np.zeros((size, total))
         ways[:, first : first + size] = np.eye(size)
         first += size
-        if linked and number.name.startswith(ENDS):
+        if linked and is_of_end(number.name):
             continue
         if number.name.endswith(ATTITUDE.place) and size == 4:
             # Four numbers of length 1 have three ways to change: a turn of the body about each of its axes.

@@ -36,6 +36,21 @@ def of_part(owner, field, place=None):
     return changed
 
 
+def of_all(field):
+    return lambda team, value: replace(
+        team, members=[replace(member, **{field: value}) for member in team.members]
+    )
+
+
+def of_member(index, field):
+    def changed(team, value):
+        members = list(team.members)
+        members[index] = replace(members[index], **{field: value})
+        return replace(team, members=members)
+
+    return changed
+
+
 def of_zone(index, field, place=None):
     def changed(problem, value):
         zones = list(problem.constraints)
@@ -92,6 +107,10 @@ SCENES = {
     ),
     "gates": ({}, {"duration": (of_field("duration"), 1e-2), "mass": (of_field("mass"), 1e-3)}),
     "two_stage_ascent": ({}, {"mass": (of_field("mass"), 1.0)}),
+    "three_robots": (
+        {"order": 2, "steps": 30},
+        {"duration": (of_all("duration"), 1e-2), "north_mass": (of_member(2, "mass"), 1e-2)},
+    ),
 }
 
 
@@ -213,6 +232,14 @@ def test_predictions_of_bodies_and_missions():
     moved = np.abs(answer.path.control - again.path.control).max()
     assert np.abs(near.control - again.path.control).max() < 0.02 * moved
     assert np.linalg.norm(near.position, axis=1) == pytest.approx(np.ones(len(near.position)), abs=1e-14)
+    team = made("three_robots")
+    answer = solve(team, order=2, steps=30)
+    near = predict(answer, duration=30.5, north_mass=14.1)
+    assert [leg.duration for leg in near.legs] == [30.5] * 3 and set(near.legs[2].mass) == {14.1}
+    changed = of_member(2, "mass")(of_all("duration")(team, 30.5), 14.1)
+    again = solve(changed, order=2, steps=30, guess=answer)
+    sizes = [np.concatenate([leg.control for leg in path.legs]) for path in (answer.path, near, again.path)]
+    assert np.abs(sizes[1] - sizes[2]).max() < 0.1 * np.abs(sizes[0] - sizes[2]).max()
     mission = made("gates")
     answer = solve(mission)
     near = predict(answer, duration=31.0)
