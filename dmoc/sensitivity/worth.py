@@ -28,8 +28,8 @@ SPANS = {"durations": ("least", "most"), "start_times": ("earliest", "latest")}
 
 # A vector is one of unit length if it is so but for this [-].
 UNIT = 1e-9
-# A range that ends farther away than so many times the number has no end; nor, of a number that is zero, one that
-# ends farther away than this.
+# A range that ends farther away than so many times the number has no end; nor, of a number that is zero, one
+# that ends farther away than this.
 FAR_TIMES, FAR = 1e6, 1e13
 # The names of the numbers of both ends begin with these, of a team behind the name of a body.
 ENDS = ("start_", "goal_")
