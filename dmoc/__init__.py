@@ -135,6 +135,8 @@ if TYPE_CHECKING:
     from dmoc.sensitivity.dispersion import Dispersion as Dispersion
     from dmoc.sensitivity.dispersion import disperse as disperse
     from dmoc.sensitivity.predict import predict as predict
+    from dmoc.sensitivity.symmetries import Symmetry as Symmetry
+    from dmoc.sensitivity.symmetries import symmetries as symmetries
     from dmoc.sensitivity.worth import Worth as Worth
     from dmoc.sensitivity.worth import worth as worth
     from dmoc.structure.front import load as load

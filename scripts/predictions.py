@@ -34,7 +34,9 @@ def main() -> None:
     worth(replace(answer))
     print(f"worth of all numbers, with the factorisation: {1e3 * (time.perf_counter() - begun):.1f} ms")
     worth(answer)
-    print("change  prediction  nlp.solve  solve   error of the path and of the force, as a part of their change")
+    print(
+        "change  prediction  nlp.solve  solve   error of the path and of the force, as a part of their change"
+    )
     for part in CHANGES:
         mass, duration = 1 + part, 12 * (1 + part)
         changed = replace(problem, mass=mass, duration=duration)
@@ -48,10 +50,7 @@ def main() -> None:
                 (near.control, again.path.control, answer.path.control),
             )
         ]
-        print(
-            f"{part:6.3f}  {fast:7.2f} ms  {warm:6.1f} ms  {plain:4.0f} ms"
-            f"  {errors[0]:.1%}, {errors[1]:.1%}"
-        )
+        print(f"{part:6.3f}  {fast:7.2f} ms  {warm:6.1f} ms  {plain:4.0f} ms  {errors[0]:.1%}, {errors[1]:.1%}")
 
 
 def timed(run: Callable[[], Any]) -> tuple[Any, float]:

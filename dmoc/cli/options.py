@@ -223,7 +223,7 @@ def show_answer(
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        more = {"worth": found[0]} if found else {}
+        more = found[0] if found else {}
         print(report_json.as_text(report_json.solve_object(solution, verdict) | more))
     else:
         from dmoc.reports import words as report

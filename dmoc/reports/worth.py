@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from rich.text import Text
 
 from dmoc.reports.as_json import worth_object
 from dmoc.reports.layout import plain_table
+from dmoc.sensitivity.symmetries import Symmetry, symmetries
 from dmoc.sensitivity.worth import Worth, is_of_end, worth
 
 # A change is this part of the number, or of the size of its kind, rounded down to 1, 2 or 5 of a decimal [-].
@@ -26,12 +29,13 @@ SENTENCES = 5
 
 def worth_told(solution: Any) -> tuple[dict[str, Any], RenderableType]:
     """What the numbers of a solution are worth, for JSON and as a table."""
-    found = worth(solution)
-    return worth_object(found), worth_table(found, solution)
+    found, kept = worth(solution), symmetries(solution)
+    told = {"worth": worth_object(found), "symmetries": [asdict(one) for one in kept]}
+    return told, worth_table(found, solution, kept)
 
 
-def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
-    """A table of all numbers that matter, and sentences on those that matter most."""
+def worth_table(found: dict[str, Worth], solution: Any, kept: Sequence[Symmetry] = ()) -> RenderableType:
+    """A table of all numbers that matter, sentences on those that matter most, and what symmetries keep."""
     steps = {name: change_of(one, solution) for name, one in found.items()}
     effects = {name: abs(one.value) * steps[name] for name, one in found.items()}
     least = NOTHING * max(effects.values(), default=0.0)
@@ -55,6 +59,12 @@ def worth_table(found: dict[str, Worth], solution: Any) -> RenderableType:
         )
     if said:
         notes += [Text(), Text("To first order:"), *said]
+    notes += [Text()] * bool(kept)
+    for same in kept:
+        words = f"A scene {same.words} is the same: the costates' momentum, what it costs to move the goal so,"
+        notes.append(
+            Text(f"{words} is {same.value:.6g} {same.unit} all the way, to {same.drift:.0e} of its parts.")
+        )
     head = Text("What the numbers of the problem are worth: change of the objective per unit of each", "bold")
     return Group(head, *([table] if listed else []), *notes, Text())
 

@@ -119,7 +119,7 @@ class Optimum:
         Programming, 1983, chapter 3).
         """
         by_p = np.zeros(len(self.p))
-        for block, given in self._given():
+        for block, given in self.given():
             first = by_parameters(block.kernel)(*given)[0].full()
             np.add.at(by_p, block.first + np.array(block.kernel.used[1], int), _per(first, block).sum(axis=1))
         lower, upper, low, high, through = self.matrices
@@ -132,7 +132,7 @@ class Optimum:
     def gradient(self) -> np.ndarray:
         """Scaled gradient of f + lam_g . g by the unknowns."""
         found = np.zeros(len(self.x))
-        for block, given in self._given():
+        for block, given in self.given():
             np.add.at(found, block.columns, block.kernel.slope(*given)[0].full())
         return found * self.column_scales / self.cost
 
@@ -140,7 +140,7 @@ class Optimum:
     def rows(self) -> np.ndarray:
         """Scaled rows."""
         found = np.zeros(len(self.lam_g))
-        for block, given in self._given():
+        for block, given in self.given():
             np.add.at(found, block.targets, block.kernel.slope(*given)[1].full())
         return found * self.row_scales
 
@@ -148,7 +148,7 @@ class Optimum:
     def mixed(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Scaled derivatives by parameters: of the Lagrangian's gradient by the unknowns, and of the rows."""
         parts: list[list[tuple]] = [[], []]
-        for block, given in self._given():
+        for block, given in self.given():
             inside = block.first + np.array(block.kernel.used[1], int)
             if not len(inside):
                 continue
@@ -172,7 +172,7 @@ class Optimum:
     def hessian(self) -> sparse.csr_matrix:
         """Scaled second derivatives of the Lagrangian by the unknowns."""
         parts = []
-        for block, given in self._given():
+        for block, given in self.given():
             row, column = map(np.array, block.kernel.hessian.get_triplet())
             if not len(row):
                 continue
@@ -188,7 +188,7 @@ class Optimum:
     def jacobian(self) -> sparse.csr_matrix:
         """Scaled derivatives of the rows by the unknowns."""
         parts = []
-        for block, given in self._given():
+        for block, given in self.given():
             row, column = map(np.array, block.kernel.jacobian.get_triplet())
             if len(row):
                 values = block.kernel.functions["jacobian"](*given[:3]).full()
@@ -196,7 +196,7 @@ class Optimum:
         shape = len(self.lam_g), len(self.x)
         return sparse.diags(self.row_scales) @ _sum(parts, shape) @ sparse.diags(self.column_scales)
 
-    def _given(self) -> Iterator[tuple[Block, tuple]]:
+    def given(self) -> Iterator[tuple[Block, tuple]]:
         """Each block, and what its kernel takes there: one column an evaluation."""
         unknowns = self.x * self.column_scales
         multipliers = self.lam_g * self.row_scales * self.cost

@@ -436,6 +436,7 @@ def test_every_constructor_is_tried():
         "Solution",
         "SolveError",
         "TeamSolution",
+        "Symmetry",
         "Trajectory",
         "Worth",
     }
@@ -505,6 +506,7 @@ CALLS = {
     "solve to a tolerance": (solve, {"problem": HERE, "tol": 1e-2, "order": 4, "steps": 4}),
     "transcribe": (transcribe, {"problem": HERE, "steps": 4, "order": 2, "mesh": None, "guess": None}),
     "verify": (verify, {"problem": HERE}),
+    "symmetries": (dmoc.symmetries, {}),
     "worth": (dmoc.worth, {}),
 }
 # None means "not given"; what such a function raises in the middle of a solve is what solve raises
@@ -515,7 +517,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("verify", "save_figure", "worth", "predict", "disperse"):
+    if name in ("verify", "save_figure", "symmetries", "worth", "predict", "disperse"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:

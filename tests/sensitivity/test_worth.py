@@ -286,8 +286,11 @@ def test_the_commands_say_what_numbers_are_worth(capsys, tmp_path):
     assert "duration: 0.1 s more saves 6.06e-05 N^2 s (3.6 %)" in told.out
     assert "mass at the start: 0.01 kg less saves 3.38e-05 N^2 s (2 %)" in told.out
     assert "position of the goal, x: +0.02 m saves" in told.out
+    assert "A scene turned about (0, 0) m is the same" in told.out
     code, told = run(capsys, "check", file, "--worth", "--json")
     found = json.loads(told.out)["worth"]
+    (kept,) = json.loads(told.out)["symmetries"]
+    assert kept["drift"] < 1e-9 and kept["unit"] == "N^2 s/rad"
     assert code == 0 and found["duration"]["value"] == pytest.approx(-6.0554945e-4, rel=1e-7)
     assert found["duration"]["range"] == [None, None] and found["mass"]["unit"] == "N^2 s/kg"
     assert found["mass"]["number"] == 1 and found["mass"]["number_unit"] == "kg"
