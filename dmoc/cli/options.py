@@ -216,7 +216,7 @@ def show_answer(
 ) -> None:
     """Print the answer and exit with the code that says how good it is."""
     found: tuple = ()
-    if with_worth and solution.optimal:
+    if with_worth and solution.optimal and (as_json or not quiet):
         from dmoc.reports.worth import worth_told
 
         found = worth_told(solution)

@@ -177,7 +177,7 @@ def _flights(solution: Any) -> Flights:
     of_kind("solution", solution, Outcome)
     problem = solution.require_problem()
     if not isinstance(solution, Solution):
-        raise ValueError("disperse takes the solution of a transfer; this is one of a mission of legs")
+        raise ValueError("disperse takes the solution of one transfer, not that of a mission or of a team")
     if not solution.optimal:
         raise ValueError(f"disperse needs a path that can be flown; this solve ended with {solution.status!r}")
     blocks = Dynamics.of(problem).configuration.coordinates.blocks

@@ -69,7 +69,7 @@ def symmetries(solution: Any) -> tuple[Symmetry, ...]:
     size = max(solution.path.diagonal, 1e-300)
     motions = _motions(solution.dimension, size)
     changes, ends, scale = _changes(optimum, motions)
-    _, values, ways = np.linalg.svd(changes / max(scale.max(), 1e-300), full_matrices=True)
+    _, values, ways = np.linalg.svd(np.linalg.qr(changes / max(scale.max(), 1e-300), mode="r"))
     values = np.append(values, np.zeros(len(motions) - len(values)))
     found = []
     for way in _reduced(ways[values < SAME * np.sqrt(len(changes))]):

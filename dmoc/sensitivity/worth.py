@@ -79,7 +79,8 @@ def worth(solution: Any) -> dict[str, Worth]:
     Nothing is solved again. As the envelope theorem says, the derivative is that of the Lagrangian at the
     answer, with unknowns and multipliers fixed (Fiacco 1983, chapter 3). The range comes from one
     factorisation of the optimality conditions; on a finer mesh more nodes meet a limit, one after the other, so
-    that it is shorter there, while values hardly change.
+    that it is shorter there, while values hardly change. Where burns and touches are legs, as with
+    `solve(problem, structure=True)`, it reaches to where one of them ends.
 
     Parameters
     ----------

@@ -93,7 +93,8 @@ def test_three_axes_and_an_engine():
 
 
 def test_what_has_none():
-    for name in ("halo_transfer", "reorientation"):
+    # Some screw keeps the distances from all spheres at the few nodes that touch them, by chance.
+    for name in ("halo_transfer", "reorientation", "free_flyer"):
         assert symmetries(solve(load_problem(name).make(), order=4, steps=40)) == ()
     with pytest.raises(ValueError, match="solution must be a"):
         symmetries(load_problem("orbit_raise").make())

@@ -178,6 +178,21 @@ def test_a_free_duration_is_worth_something_where_its_end_acts():
     assert found["durations.least"].value == pytest.approx(0, abs=1e-6)
 
 
+def test_the_range_of_legs_reaches_to_where_one_ends():
+    """The burns of the coarse answer are legs; with a little more time its path changes as predicted."""
+    answer = solve(made("two_body_fuel"), order=4, steps=60, structure=True).raise_for_status()
+    duration = worth(answer)["duration"]
+    low, high = duration.range
+    assert 10.5 < low < 10.95 and 11.05 < high < 11.5
+    near = predict(answer, duration=11.05)
+    again = solve(replace(answer.problem, duration=11.05), guess=near).raise_for_status()
+    assert (again.objective - answer.objective) / 0.05 == pytest.approx(duration.value, rel=0.02)
+    lasts = [
+        np.array([leg.duration for leg in legs]) for legs in (answer.path.legs, near.legs, again.path.legs)
+    ]
+    assert np.abs(lasts[1] - lasts[2]).max() < 0.2 * np.abs(lasts[0] - lasts[2]).max()
+
+
 def test_directions_change_without_their_length():
     found = worth(solve(made("formation"), order=2, steps=40))
     assert found["approach_cone_1_axis.y"].value == pytest.approx(0, abs=1e-8)
