@@ -19,11 +19,12 @@ def disperse(
     start: Annotated[
         str,
         typer.Option(
-            metavar="A,B", help="Standard deviations of position [m] and velocity [m/s] at the start."
+            metavar="A,B",
+            help="Standard deviations at the start: of the position in m, of the velocity in m/s.",
         ),
     ] = "0,0",
     force: Annotated[float, typer.Option(help="That of the force, relative.")] = 0.0,
-    pointing: Annotated[float, typer.Option(help="That of a turn of the force [rad].")] = 0.0,
+    pointing: Annotated[float, typer.Option(help="That of a turn of the force, in rad.")] = 0.0,
     mass: Annotated[float, typer.Option(help="That of the mass, relative.")] = 0.0,
     samples: Annotated[int, typer.Option(help="Flights, at least 2.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same flights.")] = 0,
