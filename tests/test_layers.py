@@ -31,7 +31,7 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports", "conversions"],
+    ["studies", "sweeps", "exports", "conversions", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
     ["cli"],

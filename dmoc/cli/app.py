@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from dmoc.cli import new as new_command
+from dmoc.cli import disperse as disperse_command
 from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -30,6 +30,7 @@ from dmoc.cli.options import (
     Source,
     Steps,
     Version,
+    Worth,
     attached,
     ends_at_once,
     fail,
@@ -70,7 +71,32 @@ def list_problems() -> None:
     report.console().print(report.pairs(found))
 
 
-app.command(epilog="Example: dmoc new my_flight --from orbit_raise")(new_command.new)
+@app.command(epilog="Example: dmoc new my_flight --from orbit_raise")
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the new problem file, without .py.")],
+    source: Annotated[
+        str, typer.Option("--from", help="The problem to copy: a name (see dmoc list) or a path to a .py file.")
+    ] = "free_flyer",
+) -> None:
+    """Copy a problem file into this folder, to change it there."""
+    from dmoc.basics.files import whole_file
+    from dmoc.reports import words as report
+    from dmoc.scene.problem_file import find
+
+    stem = name.removesuffix(".py")
+    if not stem.isidentifier():
+        raise ValueError(
+            f"{name!r} is no name for a problem file; give letters, digits and _, such as my_flight"
+        )
+    target = Path(f"{stem}.py")
+    if target.exists():
+        raise ValueError(f"{target} is there already; give another name, or remove it first")
+    text = find(source).read_bytes()
+    with whole_file(target) as temporary:
+        Path(temporary).write_bytes(text)
+    report.console().print(
+        f"wrote {target}, a copy of {source}; change it, and solve it with: dmoc solve {target}"
+    )
 
 
 @app.command(epilog="Example: dmoc show free_flyer")
@@ -122,14 +148,14 @@ def effects(
 
 
 @app.command(epilog="Example: dmoc check flight.nc")
-def check(file: File, source: Source = None, as_json: Json = False) -> None:
+def check(file: File, source: Source = None, worth: Worth = False, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.structure.front import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
         verdict = verify(solution)
-    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
+    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED, with_worth=worth)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
@@ -217,6 +243,10 @@ def doctor() -> None:
 for _verb, _example in (
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
+    (
+        disperse_command.disperse,
+        "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
     (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),

@@ -98,13 +98,17 @@ def sweep(
             **numerics,
             **spread,
         )
-    if as_json:
-        from dmoc.reports import as_json as report_json
+    spent = time.perf_counter() - begun, tries["done"] - tries["before"]
+    raise typer.Exit(_print_json(data, out) if as_json else _show(data, out, *spent, quiet))
 
-        found = report_json.sweep_object(data, out)
-        print(report_json.as_text(found))
-        raise typer.Exit(_code(found["points"], found["solved"], found["checks_fail"]))
-    raise typer.Exit(_show(data, out, time.perf_counter() - begun, tries["done"] - tries["before"], quiet))
+
+def _print_json(data: Any, out: Path) -> int:
+    """Print a sweep as one JSON object, and the exit code that says what came of it."""
+    from dmoc.reports import as_json as report_json
+
+    found = report_json.sweep_object(data, out)
+    print(report_json.as_text(found))
+    return _code(found["points"], found["solved"], found["checks_fail"])
 
 
 def _code(points: int, solved: int, broken: int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.configurations.coordinates import QUATERNION_NAMES
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.momenta import slopes_at_nodes
+from dmoc.motion.momenta import node_velocities
 
 # Legs whose places differ by more than this part of the path [-] where they meet count from several frames.
 APART = 1e-5
@@ -83,7 +83,8 @@ def _stretch(solution: Any, name: str) -> Stretch:
     path, made = solution.path, solution.path.coordinates
     count, degree = len(path.position), scheme(path.order).degree
     place = solution.position
-    velocity = slopes_at_nodes(path, place, solution.velocity) if place.size else np.zeros((count, 0))
+    moved = replace(path, position=place)
+    velocity = node_velocities(moved, solution.velocity) if place.size else np.zeros((count, 0))
     labels = made.place_labels
     columns = {"time [s]": solution.time}
     columns |= columns_of("position", labels, "m", place) | columns_of("velocity", labels, "m/s", velocity)

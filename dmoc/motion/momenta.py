@@ -74,15 +74,10 @@ def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) 
 
 def node_velocities(path: DiscretePath, ends: np.ndarray) -> np.ndarray:
     """dq/dt at every node: that at the step ends, and of a polynomial with those inside the steps."""
-    return slopes_at_nodes(path, path.position, ends)
-
-
-def slopes_at_nodes(path: DiscretePath, position: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """As `node_velocities`, of some columns of the positions."""
     rule, h = scheme(path.order), path.duration * np.diff(path.mesh)[:, None]
     at = step_nodes(len(path.mesh) - 1, rule)
-    known = [*position[at], ends[:-1] * h, ends[1:] * h]
-    velocity = np.empty_like(position)
+    known = [*path.position[at], ends[:-1] * h, ends[1:] * h]
+    velocity = np.empty_like(path.position)
     velocity[at] = np.einsum("ij,jkn->ikn", rule.hermite_slopes(), known) / h
     velocity[:: rule.degree] = ends
     return velocity

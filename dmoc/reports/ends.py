@@ -1,9 +1,9 @@
-"""Where a transfer starts and ends, in words: what moves is told at the time when the body is there."""
+"""When and where transfers start and end, in words; what moves is told at the time when the body is there."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.digits import lasting
 
@@ -89,3 +89,37 @@ def final_rows(trajectory: Trajectory) -> list[tuple[str, str]]:
     ]
     known = [(name, rows[-1], unit) for name, rows, unit in found if rows is not None and rows.shape[1]]
     return [(name, f"{_point(last, 10)} {unit}") for name, last, unit in known]
+
+
+def dates_rows(scene: Any) -> list[tuple[str, Any]]:
+    """What times and positions count from, as rows of a scene in words; none where nothing knows the date."""
+    from dmoc.scene.clock import clock_of
+
+    clock = clock_of(scene)
+    if clock is None:
+        return []
+    exact = [f"positions of {' and '.join(clock.known)}"]
+    return [("dates", [clock.words(), *(clock.cautions or exact)])]
+
+
+def dates_words(solution: Any) -> str:
+    """Such as `from 2028-11-20 07:15 to 2029-09-13 01:02 TDB`; empty where nothing knows the date."""
+    epoch = solution.provenance.epoch
+    if not epoch:
+        return ""
+    from dmoc.planets.dates import minutes_of
+
+    first, last = (minutes_of(epoch, float(t)) for t in (solution.time[0], solution.time[-1]))
+    return f"from {first} to {last} TDB"
+
+
+def dates_object(solution: Any) -> dict[str, Any]:
+    """Epoch, frame, center and the dates of start and goal for JSON; empty where nothing knows the date."""
+    about = solution.provenance
+    if not about.epoch:
+        return {}
+    from dmoc.planets.dates import later
+
+    first, last = (later(about.epoch, float(t)) for t in (solution.time[0], solution.time[-1]))
+    places = {"epoch": about.epoch, "frame": about.frame, "center": about.center}
+    return places | {"time_scale": "TDB", "start_date": first, "goal_date": last}

@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from dmoc.basics.digits import lasting
-from dmoc.reports.dates import dates_rows
+from dmoc.reports.ends import dates_rows
 from dmoc.reports.layout import effect_words, pairs, plain_table
 
 if TYPE_CHECKING:
