@@ -105,6 +105,7 @@ def test_json_stays_pure_when_the_problem_file_prints(run, folder):
 def test_numbers_that_are_not_finite_become_null():
     from dmoc.checks.verification import Check, Report
     from dmoc.reports.as_json import as_text, solve_object
+    from dmoc.results.facts import Provenance
 
     class Diverged:
         problem = type("Problem", (), {"name": "p"})
@@ -112,6 +113,7 @@ def test_numbers_that_are_not_finite_become_null():
         message, worst = "start elsewhere", (("goal.x", float("nan"), "m"),)
         objective, duration, final_mass = float("nan"), float("inf"), 1.0
         build_s, solve_s, position, error = 0.1, 0.2, [0] * 5, None
+        provenance = Provenance()
 
         def require_problem(self):
             return self.problem
