@@ -102,7 +102,7 @@ def _origin(solution: Any, epoch: Any, frame: Any, center: Any, scale: Any) -> O
     if about.epoch and scale not in (None, "TDB"):
         raise ValueError("the scene counts time in TDB already; leave time_system out")
     found = {name: getattr(about, name) or value or "" for name, value in given.items()}
-    return Origin(found["epoch"], found["frame"], found["center"], scale or "TDB")
+    return Origin(found["epoch"], found["frame"].upper(), found["center"], scale or "TDB")
 
 
 def _table_text(solution: Any, origin: Origin) -> str:

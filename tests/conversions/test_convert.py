@@ -219,6 +219,15 @@ def test_the_ecliptic_is_turned_to_the_frame_of_the_format(to_mars, tmp_path):
     np.testing.assert_allclose(1e3 * states[0, 3:], turn @ to_mars.legs[0].velocity[0], rtol=1e-13)
 
 
+def test_an_ecliptic_that_is_given_is_turned_too(transfer, tmp_path):
+    for frame in ("ECLIPJ2000", "eclipj2000"):
+        convert(transfer, tmp_path / "path.oem", **GIVEN | {"frame": frame})
+        ((keys, _, states),) = read_oem(tmp_path / "path.oem")
+        assert keys["REF_FRAME"] == "ICRF"
+        y, z = transfer.position[-1, 1:] / 1e3
+        assert states[-1, 2] == pytest.approx(np.sin(OBLIQUITY) * y + np.cos(OBLIQUITY) * z, rel=1e-12)
+
+
 def test_another_reader_reads_an_oem(mission, tmp_path):
     oem = pytest.importorskip("oem")
     convert(mission, tmp_path / "path.oem", **GIVEN)
