@@ -29,9 +29,10 @@ LAYERS = [
     ["missions"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports"],
+    ["studies", "sweeps", "exports", "answers"],
     ["plots", "reports"],
     ["charts", "films"],
+    ["notebook"],
     ["cli"],
 ]
 FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}

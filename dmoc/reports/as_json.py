@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from dmoc.answers.facts import facts_of
 from dmoc.basics.plain import finite
 from dmoc.reports.verdict import accuracy
 
@@ -45,6 +46,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             }
             for check in listed
         },
+        "facts": _facts(solution) if report else {},
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
     }
 
@@ -79,6 +81,11 @@ def _of_mission(solution: Any) -> dict[str, Any]:
         ],
         "primer": {"time": [float(t) for t in times], "length": [float(size) for size in sizes]},
     }
+
+
+def _facts(solution: Any) -> dict[str, Any]:
+    """What users ask of an answer, in SI units."""
+    return {name: {"value": fact.value, "unit": fact.unit} for name, fact in facts_of(solution).items()}
 
 
 def as_text(value: dict[str, Any]) -> str:
