@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 from dmoc.answers.facts import facts_of
@@ -46,7 +47,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             }
             for check in listed
         },
-        "facts": _facts(solution) if report else {},
+        "facts": _facts(solution) if report and math.isfinite(solution.objective) else {},
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
     }
 

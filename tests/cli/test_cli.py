@@ -15,7 +15,7 @@ from dmoc.scene.problem_file import load_problem
 
 FIGURES = ("objective", "duration", "final_mass", "order", "steps", "nodes", "iterations")
 WORDS = ("problem", "success", "status", "message", "worst", "warnings")
-KEYS = [*WORDS, *FIGURES, "build_s", "solve_s", "verify_s", "accuracy", "checks"]
+KEYS = [*WORDS, *FIGURES, "build_s", "solve_s", "verify_s", "accuracy", "checks", "facts"]
 
 PUSH = """
     \"\"\"A push.\"\"\"
