@@ -81,6 +81,9 @@ if TYPE_CHECKING:
     from dmoc.legs.legs import Coast as Coast
     from dmoc.legs.legs import Leg as Leg
     from dmoc.legs.objectives import DeltaV as DeltaV
+    from dmoc.legs.together import Apart as Apart
+    from dmoc.legs.together import Meet as Meet
+    from dmoc.legs.together import Together as Together
     from dmoc.links.holonomic import Holonomic as Holonomic
     from dmoc.links.joint import Joint as Joint
     from dmoc.links.joint_limits import JointLimit as JointLimit
@@ -128,6 +131,7 @@ if TYPE_CHECKING:
     from dmoc.results.solution import SolveError as SolveError
     from dmoc.scene.mission import Mission as Mission
     from dmoc.scene.problem import TransferProblem as TransferProblem
+    from dmoc.scene.team import Team as Team
     from dmoc.structure.front import load as load
     from dmoc.structure.front import solve as solve
     from dmoc.structure.front import verify as verify
@@ -136,6 +140,7 @@ if TYPE_CHECKING:
     from dmoc.studies.drift import drift as drift
     from dmoc.studies.flights import simulate as simulate
     from dmoc.sweeps.sweep import sweep as sweep
+    from dmoc.teams.solution import TeamSolution as TeamSolution
 
 
 @cache

@@ -114,6 +114,17 @@ def link(names):
     assert still.reaction == pytest.approx(np.full_like(still.reaction, -9.81), rel=1e-9)
 
 
+def between(names):
+    """Cut loose they fly 2 m apart; in range 1.5 m, which the check sees at the nodes."""
+    alone, together = names["alone"], names["together"]
+    assert alone.distance("body 1", "body 2").max() > 1.9
+    assert together.distance("body 1", "body 2").max() == pytest.approx(1.5, rel=1e-6)
+    assert dmoc.verify(together).ok
+    verdict = dmoc.verify(together, replace(together.problem, together=(names["InRange"](1.4),)))["together"]
+    assert not verdict.ok and verdict.note == "worst: in range body 1 and body 2 range at nodes"
+    assert together.problem.together[0].words() == "all bodies stay within 1.5 m"
+
+
 def check(names):
     """The largest power of least effort from rest to rest is sqrt(3) m d^2 / (T^3 / 8) / 2 here: sqrt(3) W."""
     report = names["report"]
@@ -144,6 +155,7 @@ RIGHT = {
     "A constraint": constraint,
     "A link": link,
     "An end condition": end,
+    "Between two bodies": between,
     "A check": check,
     "Another method": method,
 }

@@ -27,6 +27,7 @@ LAYERS = [
     ["diagnosis"],
     ["solver", "checks"],
     ["missions"],
+    ["teams"],
     ["structure"],
     ["planners"],
     ["studies", "sweeps", "exports", "answers"],
@@ -124,14 +125,15 @@ def test_the_front_loads_nothing_heavy():
     assert done.stdout.split() == []
 
 
-HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py"]
+TEAMS = ["dmoc.scene.team", "dmoc.legs.together", "dmoc.teams.program", "dmoc.teams.solution"]
+HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py", "pydantic"]
 
 
 @pytest.mark.parametrize(
     "arguments, unused",
     [
         # force-free, coasts, a spiral to an orbit, an orbit that winds, three bodies
-        ("free_flyer", [*HEAVY, "dmoc.links.joints", "dmoc.links.along", "dmoc.guess.turning"]),
+        ("free_flyer", [*HEAVY, "dmoc.links.joints", "dmoc.links.along", "dmoc.guess.turning", *TEAMS]),
         ("two_body_fuel", HEAVY),
         ("leo_raise --order 4", HEAVY),
         ("dionysus --json", [*HEAVY, "rich.console"]),

@@ -83,7 +83,7 @@ def show(name: Name, settings: Settings = None) -> None:
     file, problem = problem_of(name, settings)
     console = report.console()
     tables = [report.scene(problem), report.parameters(file.parameters)]
-    if not hasattr(problem, "plan"):
+    if not hasattr(problem, "leg_names"):
         guess = first_path(problem)
         tables.append(report.sizes(transcribe_onto(problem, guess, units_of(problem, guess))))
     for part in (report.prose(file.docstring), *tables):

@@ -102,8 +102,13 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
 
 
 def transfer_of(name: str, settings: list[str] | None, verb: str) -> Any:
-    """The problem of a verb that has no meaning for a mission of several legs."""
+    """The problem of a verb that has no meaning for a mission of several legs or a team of bodies."""
     problem = problem_of(name, settings)[1]
+    if hasattr(problem, "together"):
+        raise ValueError(
+            f"dmoc {verb} takes a transfer, but {name} is a team of bodies; state the body that you mean as a "
+            "TransferProblem"
+        )
     if hasattr(problem, "plan"):
         raise ValueError(
             f"dmoc {verb} takes a transfer, but {name} is a mission of legs; state the leg that you mean as a "
@@ -117,7 +122,11 @@ def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: 
     from dmoc.reports import words as report
     from dmoc.reports.tables import optima_table
 
-    if hasattr(problem, "plan"):
+    if hasattr(problem, "together"):
+        from dmoc.teams.optima import team_optima
+
+        found = team_optima(problem, starts, order, hold, guess)
+    elif hasattr(problem, "plan"):
         from dmoc.studies.optima import mission_optima
 
         found = mission_optima(problem, starts, order, hold, guess)

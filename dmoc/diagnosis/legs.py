@@ -1,6 +1,7 @@
-"""Why a mission is not met: limits of its legs and impulses that give way, one by one or together, or its rows.
+"""Why a mission or a team is not met: limits that give way, one by one or together, or its rows.
 
-The program of a mission comes from above; what is asked of it here is what `Relaxation` asks of an NLP.
+They are those of legs and impulses, or of bodies and between them. The program of a mission or a team comes
+from above; what is asked of it here is what `Relaxation` asks of an NLP.
 """
 
 from __future__ import annotations
@@ -65,10 +66,9 @@ class Elastic:
 
     def level(self, answer: Answer, build_s: float) -> Level:
         """One run as a level of the ladder."""
-        schemes = [leg.program.scheme.order for leg in self.program.legs]
-        steps = sum(len(leg.program.mesh) - 1 for leg in self.program.legs)
+        order, steps = self.program.numerics
         told = answer.iterations, answer.objective, build_s, answer.seconds, answer.status
-        return Level(max(schemes), steps, *told, evaluations=answer.evaluations)
+        return Level(order, steps, *told, evaluations=answer.evaluations)
 
     def relaxed(self, *limits: Yielding) -> Relaxation:
         """The elastic program in which these limits give way by one slack."""
@@ -102,7 +102,8 @@ def mission_cause(
     the `Level` of every run; once `interrupt` has seen something, nothing is found any more.
     """
     elastic = Elastic(program, tell, interrupt)
-    limits = [*_of_legs(program, paths[0]), *_of_impulses(program)]
+    between = _of_impulses if hasattr(program.mission, "joints") else _of_pairs
+    limits = [*_of_legs(program, paths[0]), *between(program)]
     if limits:
         relaxed = elastic.relaxed(*limits)
         for path in paths:
@@ -161,6 +162,26 @@ def _of_impulses(program: Any) -> list[Yielding]:
 def _of_impulse(limit: float, name: str) -> Callable[[float], str]:
     def words(slack: float) -> str:
         return f"an impulse of {up(limit * np.sqrt(1 + slack))} m/s at the {name} (you gave {limit:g} m/s)"
+
+    return words
+
+
+def _of_pairs(program: Any) -> list[Yielding]:
+    """What two bodies of a team keep all along, whose rows are at the nodes that they share."""
+    found, none = [], np.zeros(0)
+    for name, (part, a, b) in zip(program.mission.pair_names(), program.mission.pairs(), strict=True):
+        if part.distance_kept:
+            group = program.rows[name]
+            places = program.first_row + np.arange(group.start, group.stop)
+            both = f"between {program.mission.names[a]} and {program.mission.names[b]}"
+            words = _of_pair(part, both)
+            found.append(Yielding(words, places, np.ones(len(places)), np.zeros(0, int), none, none))
+    return found
+
+
+def _of_pair(part: Any, both: str) -> Callable[[float], str]:
+    def words(slack: float) -> str:
+        return f"{said} {both}" if (said := part.needs(slack)) else ""
 
     return words
 

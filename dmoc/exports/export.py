@@ -111,6 +111,8 @@ def export(
         If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
     """
     problem = getattr(problem, "alone", None) or problem
+    if hasattr(problem, "together"):
+        raise ValueError("a team of bodies is not exported; export the body that you mean, a TransferProblem")
     mission = hasattr(problem, "joints")
     of_kind("problem", problem, Mission if mission else TransferProblem)
     hold, c = flag("hold", hold), flag("c", c)

@@ -46,6 +46,8 @@ def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frame
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
+    if hasattr(solution, "members"):
+        raise ValueError("a team of bodies has no moving picture yet; animate(solution.members[0], path) has")
     mission = hasattr(solution, "legs")
     of_kind("solution", solution, MissionSolution if mission else Solution)
     check_target(path)

@@ -38,7 +38,7 @@ def answered(
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:
     mission, program, answer = climb.mission, attempt.program, attempt.answer
     path, status = attempt.path, answer.status
-    costs = _costs(program, answer.x)
+    costs = costs_of(program, answer.x)
     about = Provenance(
         mission.name, mission.parameters, path.begins[0], mission.objective.unit_with(mission.actuator)
     )
@@ -102,11 +102,11 @@ def _size_of(
             return in_units(placed.program, problem, layout.group_at(at), at, scaled, leg.duration)
     # The unknowns of joints have no bounds: this is a row.
     group = program.rows.group_at(place - program.first_row)
-    component = place - program.first_row - group.start
+    component = (place - program.first_row - group.start) % len(group.labels)
     return scaled / float(group.scales[0, component]), group.units[component] or "-"
 
 
-def _costs(program: MissionProgram, x: np.ndarray) -> np.ndarray:
+def costs_of(program: MissionProgram, x: np.ndarray) -> np.ndarray:
     """What each leg costs, without what belongs to joints, as it is minimised [unit of the objective]."""
     values, parameters = x * program.column_scales(), program.parameters()
     ends = [leg.columns for leg in program.legs[1:]] + [program.sizes[0]]

@@ -12,10 +12,10 @@ import numpy as np
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.optimality import idle, left_over
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report, not_finite, own_checks, refuse_twins
+from dmoc.missions.path import MissionPath
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
-from dmoc.scene.mission import Mission
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8
@@ -37,33 +37,36 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
     solution = solution if problem is None else solution.attach(problem)
     begun, mission = time.perf_counter(), solution.require_problem()
     with np.errstate(all="ignore"):
-        least = LEAST * solution.path.diagonal, LEAST * max(_fastest(leg) for leg in solution.legs)
+        least = LEAST * solution.path.diagonal, LEAST * max(fastest(leg) for leg in solution.legs)
         legs = [Evidence(replace(leg, tolerance=solution.tolerance), least) for leg in solution.legs]
         undefined = next((found for leg in legs if (found := leg.undefined())), "")
         if undefined:
             return Report((not_finite("legs", undefined),), 0.0)
         held = any(leg.path.attitudes or leg.problem.links for leg in legs)
         checks = [
-            _worst(mission, legs, check)
+            worst_of(mission.leg_names, legs, check)
             for name, check in CHECKS.items()
             if name != "optimality" and (held or name != "constraint")
         ]
-        whole = _Whole(solution)
+        path = solution.path
+        whole = Whole(solution, MissionProgram.of(mission, mission.stretches, path), path)
         checks += [whole.joints(), whole.optimality()]
         if solution.impulses:
             checks.append(primer_check(solution))
-        checks += [_worst(mission, legs, check) for _, check in own]
+        checks += [worst_of(mission.leg_names, legs, check) for _, check in own]
     refuse_twins(checks)
     return Report(tuple(checks), time.perf_counter() - begun)
 
 
-def _fastest(leg: Solution) -> float:
+def fastest(leg: Solution) -> float:
     """The largest speed at the step ends of a leg [m/s]."""
     return float(np.linalg.norm(leg.velocity, axis=1).max(initial=0.0))
 
 
-def _worst(mission: Mission, legs: Sequence[Evidence], check: Callable[[Evidence], Check]) -> Check:
-    """The check of the leg in which it is nearest to its limit, or beyond it."""
+def worst_of(
+    names: Sequence[str], legs: Sequence[Evidence], check: Callable[[Evidence], Check], named: bool = False
+) -> Check:
+    """The check of the leg in which it is nearest to its limit, or beyond it; an only leg is not `named`."""
     found = [check(leg) for leg in legs]
 
     def share(one: Check) -> float:
@@ -74,19 +77,17 @@ def _worst(mission: Mission, legs: Sequence[Evidence], check: Callable[[Evidence
         return one.value / one.limit if one.limit else 0.0
 
     worst = int(np.argmax([share(one) for one in found]))
-    if len(legs) == 1:
+    if len(legs) == 1 and not named:
         return found[0]
-    name = mission.leg_names[worst]
+    name = names[worst]
     return replace(found[worst], note=f"{name}: {found[worst].note}" if found[worst].note else name)
 
 
-class _Whole:
-    """The program of a mission on its own meshes, evaluated block by block at its solution."""
+class Whole:
+    """The program of a mission on its own meshes, evaluated block by block at its path and multipliers."""
 
-    def __init__(self, solution: MissionSolution):
+    def __init__(self, solution: Any, program: MissionProgram, path: MissionPath):
         self.solution = solution
-        mission, path = solution.require_problem(), solution.path
-        program = MissionProgram.of(mission, mission.stretches, path)
         self.program = program
         self.x = program.pack(path)
         lam_x, lam_g = program.multipliers(path)

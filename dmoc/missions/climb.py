@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
-from dmoc.missions.path import MissionPath, cold, finer, stretched
+from dmoc.missions.path import MissionPath, cold
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
@@ -65,7 +65,10 @@ class Attempt:
 class Climb:
     """The attempts at one mission, in their order."""
 
-    def __init__(self, mission: Mission, options: Any, progress: Any, compiled: bool, time_limit: float | None):
+    # What sees it as Ipopt does.
+    program: Any = MissionProgram
+
+    def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
         self.compiled = compiled
         self.interrupt = Interrupt(time_limit)
@@ -90,7 +93,7 @@ class Climb:
         """
         begun, mission = time.perf_counter(), self.mission
         problems = [_rounded(problem, rounding) for problem in mission.stretches]
-        program = MissionProgram.of(mission, problems, path, rounding)
+        program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
         if near is not None:
@@ -129,7 +132,7 @@ class Climb:
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
         for factor in OTHER_DURATIONS:
-            other = self._staged(stretched(self.mission, path, factor), stages)
+            other = self._staged(path.stretched(self.mission, factor), stages)
             if other.solved or other.answer.status == "stopped":
                 return other
         return tried
@@ -161,7 +164,8 @@ class Climb:
             for one in engines
             if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
         ]
-        if sum(event.pushes for joint in self.mission.joints for event in joint.events) > 2:
+        joints = getattr(self.mission, "joints", ())
+        if sum(event.pushes for joint in joints for event in joint.events) > 2:
             # One of several impulses may be none at the optimum.
             own.append(LEAST_WIDTH)
         if not own:
@@ -188,7 +192,7 @@ class Climb:
         for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
             if tol is None and _largest(errors) <= accurate:
                 break
-            onto = attempt.path.onto(finer(attempt.path, errors))
+            onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.attempt(onto, carried=True)

@@ -108,6 +108,19 @@ class MissionPath:
         legs = [leg.onto(mesh, order, leg.hold) for leg, (mesh, order) in zip(self.legs, meshes, strict=True)]
         return replace(self, legs=tuple(legs))
 
+    def finer(self, errors: Sequence[np.ndarray]) -> MissionPath:
+        """The same on meshes where the steps that make up the errors of all legs are cut in two."""
+        return self.onto(cut_in_two(self.legs, errors))
+
+    def stretched(self, mission: Mission, factor: float) -> MissionPath:
+        """The same with free legs that last so many times as long, within their bounds."""
+        legs = []
+        for leg, problem in zip(self.legs, mission.stretches, strict=True):
+            duration = float(np.clip(factor * leg.duration, *problem.duration_bounds))
+            legs.append(replace(leg, duration=duration))
+        begins = self.begins[0] + np.append(0.0, np.cumsum([leg.duration for leg in legs]))[:-1]
+        return replace(self, legs=tuple(legs), begins=tuple(float(t) for t in begins))
+
 
 def own_parts(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray]:
     """The unknowns of each event of a joint; empty for one that has none."""
@@ -123,16 +136,16 @@ def kicks_of(joint: Joint, own: np.ndarray | None, axes: int) -> list[np.ndarray
     return [part for event, part in parts if event.pushes and len(part)]
 
 
-def finer(path: MissionPath, errors: Sequence[np.ndarray]) -> list[tuple[np.ndarray, int]]:
+def cut_in_two(legs: Sequence[DiscretePath], errors: Sequence[np.ndarray]) -> list[tuple[np.ndarray, int]]:
     """Meshes on which the steps that make up the errors of all legs are cut in two."""
     total = np.concatenate(errors)
     order = np.argsort(total)
-    least = min(leg.order for leg in path.legs)
+    least = min(leg.order for leg in legs)
     small = np.cumsum(total[order]) <= 0.5 * 2.0**-least * total.sum()
     cut = np.ones(len(total), bool)
     cut[order[small]] = False
     found, at = [], 0
-    for leg in path.legs:
+    for leg in legs:
         mine = cut[at : at + len(leg.mesh) - 1]
         at += len(mine)
         middles = 0.5 * (leg.mesh[1:] + leg.mesh[:-1])[mine]
@@ -176,13 +189,3 @@ def coasting(path: DiscretePath, controls: int) -> DiscretePath:
 def cold(path: MissionPath) -> MissionPath:
     """A path without multipliers."""
     return replace(path, legs=tuple(replace(leg, multipliers={}) for leg in path.legs), forces={})
-
-
-def stretched(mission: Mission, path: MissionPath, factor: float) -> MissionPath:
-    """A path whose free legs last so many times as long, within their bounds."""
-    legs = []
-    for leg, problem in zip(path.legs, mission.stretches, strict=True):
-        duration = float(np.clip(factor * leg.duration, *problem.duration_bounds))
-        legs.append(replace(leg, duration=duration))
-    begins = path.begins[0] + np.append(0.0, np.cumsum([leg.duration for leg in legs]))[:-1]
-    return replace(path, legs=tuple(legs), begins=tuple(float(t) for t in begins))

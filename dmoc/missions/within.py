@@ -38,11 +38,13 @@ class Placed:
         return self.columns + self.program.columns[group].indices[:, place]
 
 
-def leg_program(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[Program, list, int]:
-    """A leg without its sparse derivatives, its blocks, and how many parameters they have."""
+def leg_program(
+    problem: TransferProblem, path: DiscretePath, units: Units, joined: bool = True
+) -> tuple[Program, list, int]:
+    """A leg without sparse derivatives, its blocks, parameters; where it begins is open if `joined`."""
     rule = scheme(path.order)
-    stencils = stencils_of(problem, path.order, path.hold, joined=True)
-    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=True)
+    stencils = stencils_of(problem, path.order, path.hold, joined=joined)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units, joined=joined)
     none: Any = None
     program = Program(
         problem,

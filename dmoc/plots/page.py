@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from dmoc.checks.verification import Report
     from dmoc.missions.solution import MissionSolution
+    from dmoc.teams.solution import TeamSolution
 
 # A figure can be written in these formats, which the end of the file's name decides.
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -49,7 +50,7 @@ FAR = 6.0
 
 
 def save_figure(
-    solution: Solution | MissionSolution,
+    solution: Solution | MissionSolution | TeamSolution,
     path: str | os.PathLike,
     report: Report | None = None,
     dpi: float = 150,
@@ -58,7 +59,7 @@ def save_figure(
 
     Parameters
     ----------
-    solution : Solution or MissionSolution
+    solution : Solution, MissionSolution or TeamSolution
     path : path
         Ends in .png, .pdf or .svg, which decides the format.
     report : Report, optional
@@ -71,7 +72,7 @@ def save_figure(
     ValueError
         If the suffix is another one or the folder does not exist.
     """
-    if not hasattr(solution, "impulses"):
+    if not (hasattr(solution, "impulses") or hasattr(solution, "members")):
         of_kind("solution", solution, Solution)
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
@@ -87,7 +88,7 @@ def figure(solution: Any, report: Report | None = None) -> Figure:
 
     Parameters
     ----------
-    solution : Solution or MissionSolution
+    solution : Solution, MissionSolution or TeamSolution
     report : Report, optional
         Checks whose outcome is written below the panels.
     """
@@ -99,6 +100,10 @@ def figure(solution: Any, report: Report | None = None) -> Figure:
             from dmoc.plots.mission import mission_page
 
             return mission_page(solution, report)
+        if hasattr(solution, "members"):
+            from dmoc.plots.team import team_page
+
+            return team_page(solution, report)
         page = new_page(solution.dimension)
         turns = bool(solution.path.attitudes)
         held = solution.reaction is not None

@@ -49,6 +49,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
         },
         "facts": _facts(solution) if report and math.isfinite(solution.objective) else {},
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
+        **(_of_team(solution) if hasattr(solution, "members") else {}),
     }
 
 
@@ -87,6 +88,25 @@ def _of_mission(solution: Any) -> dict[str, Any]:
 def _facts(solution: Any) -> dict[str, Any]:
     """What users ask of an answer, in SI units."""
     return {name: {"value": fact.value, "unit": fact.unit} for name, fact in facts_of(solution).items()}
+
+
+def _of_team(solution: Any) -> dict[str, Any]:
+    """The bodies, and the least distance of each two of them at the nodes."""
+    names = solution.names
+    return {
+        # All bodies share them.
+        "nodes": len(solution.time),
+        "bodies": [
+            {"name": name, "cost": float(one.objective), "final_mass": float(one.final_mass)}
+            for name, one in zip(names, solution.members, strict=True)
+        ],
+        "distances": [
+            {"between": [a, b], "least": float(apart.min()), "at": float(solution.time[apart.argmin()])}
+            for i, a in enumerate(names)
+            for b in names[i + 1 :]
+            for apart in [solution.distance(a, b)]
+        ],
+    }
 
 
 def as_text(value: dict[str, Any]) -> str:

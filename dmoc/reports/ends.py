@@ -43,8 +43,9 @@ def goal_words(problem: TransferProblem) -> str:
 
 def met_words(solution: Solution) -> str:
     """Where a goal that moves is met, such as `goal met at (1.5, 0) m`; empty for one that does not."""
-    goal = solution.require_problem().goal
-    if not goal.moves:
+    goal = getattr(solution.require_problem(), "goal", None)
+    # A team has a goal for each of its bodies.
+    if goal is None or not goal.moves:
         return ""
     # Of a mission the last leg ends there.
     solution = getattr(solution, "legs", (solution,))[-1]

@@ -20,6 +20,7 @@ REMEDIES = {
     "ledger": FINER,
     "bounds": FINER,
     "optimality": SHARPER,
+    "together": FINER,
     "stability": "more steps: h omega must come below the limit of the order",
 }
 # A tolerance that is better than the accuracy of an answer by this factor is named [-].

@@ -17,6 +17,7 @@ from dmoc.basics.digits import lasting
 from dmoc.reports.ends import body_words, final_rows, goal_words, met_words, start_words
 from dmoc.reports.layout import console, effect_words, pairs, plain_table, value_words
 from dmoc.reports.missions import legs_table, mission_scene
+from dmoc.reports.teams import bodies_table, team_scene
 from dmoc.reports.verdict import verdict_words
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ def scene(problem: TransferProblem) -> RenderableType:
     """What is to be done, in words."""
     if hasattr(problem, "plan"):
         return mission_scene(problem)  # type: ignore[arg-type]
+    if hasattr(problem, "together"):
+        return team_scene(problem, scene)
     shortest, longest = problem.duration_bounds
     free = f"free between {lasting(shortest, 6)} and {lasting(longest, 6)}"
     return pairs(
@@ -217,7 +220,9 @@ def live_line(unit: str) -> Iterator[Callable | None]:
 
 
 def _legs(solution: Any) -> list[RenderableType]:
-    """The legs and impulses of a mission; nothing of a transfer."""
+    """The legs and impulses of a mission, or the bodies of a team; nothing of a transfer."""
+    if hasattr(solution, "members"):
+        return [bodies_table(solution), Text()]
     if not hasattr(solution, "impulses"):
         return []
     return [legs_table(solution), Text()]

@@ -1,4 +1,4 @@
-"""Problem files: found by name, read, and made into transfer problems and missions.
+"""Problem files: found by name, read, and made into transfer problems, missions and teams.
 
 A problem file is Python with one function `problem(**parameters)`, all of whose parameters have defaults,
 that returns one. Its docstring documents them as `name : type [unit]`.
@@ -77,11 +77,10 @@ class ProblemFile:
         for name, value in values.items():
             _check_type(name, value, self.parameter(name).default)
         made = _guarded(self.path, lambda: self.function(**values))
-        if not (isinstance(made, TransferProblem) or hasattr(made, "joints")):
-            wanted = f"{FUNCTION}() must return a dmoc.TransferProblem or a dmoc.Mission"
+        if not (isinstance(made, TransferProblem) or hasattr(made, "joints") or hasattr(made, "together")):
+            wanted = f"{FUNCTION}() must return a dmoc.TransferProblem, a dmoc.Mission or a dmoc.Team"
             raise ValueError(f"{self.path}: {wanted}; it returned {_short(made)}")
-        chosen = {parameter.name: parameter.default for parameter in self.parameters} | values
-        made = replace(made, name=self.name, parameters=chosen)
+        made = replace(made, name=self.name, parameters={p.name: p.default for p in self.parameters} | values)
         return getattr(made, "alone", None) or made
 
     def parameter(self, name: str) -> Parameter:

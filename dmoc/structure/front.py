@@ -1,4 +1,4 @@
-"""What a user calls: it takes a transfer or a mission, and does for each what is made for it."""
+"""What a user calls: it takes a transfer, a mission or a team, and does for each what is made for it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,17 @@ from dmoc.scene.named import attached_as_named
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver import solve as transfer_solver
 
-# What missions are made of is loaded for them alone.
+# What missions and teams are made of is loaded for them alone.
 if TYPE_CHECKING:
     from dmoc.missions.solution import MissionSolution
     from dmoc.scene.mission import Mission
+    from dmoc.scene.team import Team
+    from dmoc.teams.solution import TeamSolution
 
 # A file of a mission says that it has this format.
 MISSION = "dmoc mission"
+# A file of a team says that it has this one.
+TEAM = "dmoc team"
 # Below this tolerance [-] structure pays by itself: steps cut at switches reach it in seconds, and hardly more.
 TIGHT = 1e-5
 
@@ -69,7 +73,7 @@ def solve(
 
 @overload
 def solve(
-    problem: TransferProblem | Mission,
+    problem: TransferProblem | Mission | Team,
     order: int | None = ...,
     steps: int | None = ...,
     tol: float | None = ...,
@@ -87,7 +91,7 @@ def solve(
 
 
 def solve(
-    problem: TransferProblem | Mission,
+    problem: TransferProblem | Mission | Team,
     order: int | None = None,
     steps: int | None = None,
     tol: float | None = None,
@@ -102,7 +106,7 @@ def solve(
     structure: bool | None = None,
     impulses: str | None = None,
 ) -> Any:
-    """Solve a transfer problem or a mission, coarse to fine.
+    """Solve a transfer problem, a mission or a team, coarse to fine.
 
     With `structure=True` a transfer is solved by its structure: the burns, coasts, singular arcs, touches of
     zones and ways along limits of a coarse answer become the legs of a mission with free ends, in each of which
@@ -113,7 +117,7 @@ def solve(
 
     Parameters
     ----------
-    problem : TransferProblem or Mission
+    problem : TransferProblem, Mission or Team
     order : int
         2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
         motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
@@ -121,7 +125,8 @@ def solve(
     steps : int
         Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8, and over many
         revolutions as many as these need. Or `mesh`: the step ends as increasing fractions 0..1. Of a
-        mission the order is 6, and the steps are those of each leg.
+        mission the order is 6, and the steps are those of each leg; of a team they are 4 and 30, the mesh is
+        one for all bodies, and steps in which two of them touch are cut.
     tol : float
         Relative error [-] of path and objective to reach instead: mesh, and the order if it is not
         given, follow from it; `steps` is then where to begin.
@@ -152,7 +157,7 @@ def solve(
 
     Returns
     -------
-    Solution or MissionSolution
+    Solution, MissionSolution or TeamSolution
         Whether it succeeded or not; `raise_for_status()` raises if not.
 
     Raises
@@ -164,6 +169,12 @@ def solve(
     rest = options, progress, compiled, time_limit
     if impulses not in (None, "auto"):
         raise ValueError(f"impulses must be 'auto' or not given; got {short(impulses)}")
+    if hasattr(stated, "together"):
+        from dmoc.teams.climb import solve_team
+
+        if structure or impulses is not None:
+            raise ValueError("structure and impulses are of one transfer or mission; a dmoc.Team has neither")
+        return solve_team(stated, order, steps, tol, hold, mesh, guess, *rest)
     if not hasattr(stated, "joints"):
         if impulses is not None:
             raise ValueError("impulses are those of a dmoc.Mission; a transfer has none")
@@ -209,12 +220,16 @@ def _by_structure(
 
 
 def verify(
-    solution: Solution | MissionSolution,
-    problem: TransferProblem | Mission | None = None,
+    solution: Solution | MissionSolution | TeamSolution,
+    problem: TransferProblem | Mission | Team | None = None,
     more: Sequence[Callable] = (),
 ) -> Report:
     if problem is None and getattr(solution, "problem", solution) is None:
         solution = attached_as_named(solution)
+    if hasattr(solution, "members"):
+        from dmoc.teams.checks import verify_team
+
+        return verify_team(solution, problem, more)  # type: ignore[arg-type]
     if not hasattr(solution, "impulses"):
         return verification.verify(solution, problem, more)  # type: ignore[arg-type]
     from dmoc.missions.checks import verify_mission
@@ -230,7 +245,12 @@ verify.__doc__ = (verification.verify.__doc__ or "").replace(
 
 
 def load(path: str | os.PathLike) -> Any:
-    if not as_path(path).is_file() or format_of(path) != MISSION:
+    kind = format_of(path) if as_path(path).is_file() else None
+    if kind == TEAM:
+        from dmoc.teams.solution import read_team
+
+        return read_team(path)
+    if kind != MISSION:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission
     from dmoc.structure.solution import as_found

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 @wraps(march.simulate)
 def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Trajectory:
     problem = getattr(problem, "alone", None) or problem
+    if hasattr(problem, "together"):
+        raise ValueError(
+            "a team of bodies cannot be simulated as a whole; simulate its members, each with its own "
+            "solution: dmoc.simulate(team.members[0], solution.members[0])"
+        )
     if hasattr(controls, "legs") and not hasattr(problem, "joints"):
         # The arcs of a transfer that was solved by its structure are the legs of a mission.
         problem = controls.attach(problem).require_problem()

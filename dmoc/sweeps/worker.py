@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 # In a packed path the names of multipliers begin with this, so that they cannot be taken for those of a field.
 MULTIPLIER = "multiplier "
-# What belongs to the joints of a mission's path.
-JOINTS = ("own", "forces")
+# What belongs to the joints of a mission's path, or stands between the bodies of a team.
+JOINTS = ("own", "forces", "densities")
 # A process solves one point at a time, also where a scheduler runs several threads in it: the output of a
 # point is redirected, which is done for the whole process.
 _TURN = threading.Lock()
@@ -87,7 +87,8 @@ def pack(path: Any) -> str:
     import numpy as np
 
     if hasattr(path, "legs"):
-        joints = {name: {key: known.tolist() for key, known in getattr(path, name).items()} for name in JOINTS}
+        kinds = [name for name in JOINTS if hasattr(path, name)]
+        joints = {name: {key: known.tolist() for key, known in getattr(path, name).items()} for name in kinds}
         facts = {"begins": path.begins, "idle": path.idle}
         return json.dumps({"legs": [pack(leg) for leg in path.legs], **facts, **joints})
     arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
@@ -107,12 +108,18 @@ def unpack(text: str) -> Any:
     from dmoc.motion.path import DiscretePath, Key
 
     if text.startswith("{"):
+        held = json.loads(text)
+        kinds = [name for name in JOINTS if name in held]
+        joints = {name: {key: np.array(known) for key, known in held[name].items()} for name in kinds}
+        facts: Any = {"idle": tuple(held.get("idle", ()))} | joints
+        legs, begins = tuple(map(unpack, held["legs"])), tuple(held["begins"])
+        if "densities" in kinds:
+            from dmoc.teams.path import TeamPath
+
+            return TeamPath(legs, begins, **facts)
         from dmoc.missions.path import MissionPath
 
-        held = json.loads(text)
-        own, forces = ({key: np.array(known) for key, known in held[name].items()} for name in JOINTS)
-        idle = tuple(held.get("idle", ()))
-        return MissionPath(tuple(map(unpack, held["legs"])), tuple(held["begins"]), own, forces, idle=idle)
+        return MissionPath(legs, begins, **facts)
     with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as stored:
         arrays = dict(stored)
     multipliers = {
@@ -185,7 +192,8 @@ def _efforts(solution: Any) -> dict[str, float]:
     from dmoc.motion.mesh import node_weights
 
     effort = impulse = 0.0
-    for leg in getattr(solution, "legs", (solution,)):
+    parts: Any = getattr(solution, "members", None) or getattr(solution, "legs", (solution,))
+    for leg in parts:
         path = leg.path
         weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
         size = np.linalg.norm(leg.force, axis=1)

@@ -47,7 +47,7 @@ RECORD = {
     "twelve_thrusters": {(2, 400): (47, 295), (8, 32): (28, 174)},
     "two_body_fuel": {(2, 400): (156, 1010), (8, 32): (104, 676)},
 }
-# Missions of several legs at their defaults: iterations on all meshes.
+# Missions of several legs and teams at their defaults: iterations on all meshes.
 MISSIONS = {
     "bielliptic": 55,
     "cw_impulses": 23,
@@ -56,6 +56,7 @@ MISSIONS = {
     "halo_orbit": 6,
     "hohmann": 14,
     "planet_to_planet": 10,
+    "three_robots": 49,
     "two_stage_ascent": 47,
 }
 MESHES = ((2, 400), (8, 32))

@@ -10,6 +10,7 @@ import io
 import math
 import shutil
 import warnings
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -58,8 +59,10 @@ from dmoc import (
     Shadow,
     State,
     System,
+    Team,
     ThirdBody,
     Time,
+    Together,
     Torque,
     TransferProblem,
     UniformAtmosphere,
@@ -75,6 +78,8 @@ from dmoc.missions.guess import guessed
 from dmoc.missions.program import MissionProgram
 from dmoc.plots.page import save_figure
 from dmoc.studies.drift import kepler
+from dmoc.teams.guess import guessed as team_guess
+from dmoc.teams.program import TeamProgram
 
 
 def scene(**parts):
@@ -82,6 +87,7 @@ def scene(**parts):
 
 
 HERE = TransferProblem(**scene())
+FIRST, SECOND = (TransferProblem(1.0, State((-x, 0), (0, 0)), State((x, 0), (0, 0)), 4.0) for x in (1.0, -1.0))
 ELLIPSE = {"mu": 1.0, "a": 9.0, "e": 0.1, "i": 0.0, "node": 0.0, "argument": 0.0, "mean_anomaly": 0.0}
 PLATES = Plates((1.0,), ((1, 0, 0),), ((0, 1, 0),))
 # arguments that are good, one of which is then replaced
@@ -154,6 +160,9 @@ MAKES = {
     },
     "LinearDrag": {"coefficient": 0.1, "wind": None},
     "Member": {"name": "a", "mass": 1.0, "inertia": None},
+    "Apart": {"distance": 0.5, "between": ()},
+    "Meet": {"velocity": True, "between": ()},
+    "Team": {"members": (FIRST, SECOND), "together": (), "names": (), "guess": None},
     "Mission": scene(
         legs=(Leg(4.0),),
         effects=(),
@@ -370,11 +379,24 @@ def as_mission(part):
     return part if isinstance(part, Mission) else None
 
 
+def as_team(part):
+    """A team with this part in it, as it would be solved; None for a part of a transfer or a mission."""
+    if isinstance(part, Together):
+        ends = FIRST, SECOND
+        if not part.distance_kept:
+            ends = tuple(replace(end, goal=Free()) for end in ends)
+        part = Team(ends, part)
+    if isinstance(part, Team):
+        TeamProgram.of(part, part.stretches, team_guess(part, (np.linspace(0, 1, 4), 4, False), part.guess))
+        assert all(words.words() for words in part.together)
+    return part if isinstance(part, Team) else None
+
+
 def try_making(name, argument, value):
     part = answered(lambda: getattr(dmoc, name)(**(MAKES[name] | {argument: value})))
-    if part is None or answered(lambda: as_mission(part)) is not None:
+    if part is None or answered(lambda: as_mission(part) or as_team(part)) is not None:
         return
-    if isinstance(part, (Mission, Leg, Event, Free)):
+    if isinstance(part, (Mission, Leg, Event, Free, Team, Together)):
         return
     problem = answered(lambda: put_to_use(part))
     if problem is not None:
@@ -398,6 +420,7 @@ def test_every_constructor_is_tried():
         "Holonomic",
         "Joint",
         "Objective",
+        "Together",
     }
     without_arguments = {"DeltaV", "Effort", "FinalMass", "FreeForce", "Fuel", "Time", "Shadow", "Unpowered"}
     results = {
@@ -411,6 +434,7 @@ def test_every_constructor_is_tried():
         "Row",
         "Solution",
         "SolveError",
+        "TeamSolution",
         "Trajectory",
     }
     assert made - abstract - without_arguments - results == set(MAKES)

@@ -1,0 +1,1 @@
+"""Teams: several bodies on one clock, in one NLP."""

@@ -1,0 +1,123 @@
+"""The answer of an attempt at a team as a TeamSolution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from dmoc.basics.digits import lasting
+from dmoc.missions.answer import costs_of, worst_rows
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.march import force_of
+from dmoc.motion.momenta import end_momenta
+from dmoc.nlp.ipopt import STATUSES
+from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.scene.problem import TransferProblem
+from dmoc.scene.team import Team
+from dmoc.solver.rung import cut_short
+from dmoc.teams.cuts import team_cuts
+from dmoc.teams.path import TeamPath
+from dmoc.teams.solution import TeamSolution
+
+
+def answered(
+    climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
+) -> TeamSolution:
+    """The answer of an attempt as a TeamSolution; that of the last mesh solved if the time was over."""
+    if attempt.answer.status == "stopped" and climb.interrupt.late:
+        attempt = climb.held or attempt
+        found: Any = _answered(climb, attempt, error, True, tol)
+        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
+    return _answered(climb, attempt, error, met, tol)
+
+
+def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> TeamSolution:
+    team, program, answer = climb.mission, attempt.program, attempt.answer
+    path, status, success = attempt.path, answer.status, attempt.solved
+    message = "a local optimum" if success else climb.reason or STATUSES[status].advice
+    if success and not met:
+        status, success = NOT_MET, False
+        reached = "unknown" if error is None else f"{error.largest:.1e}"
+        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    about = Provenance(
+        team.name,
+        team.parameters,
+        team.start_time,
+        team.objective.unit_with(team.actuator),
+        options=climb.options,
+    )
+    costs = costs_of(program, answer.x)
+    members = [
+        _member(
+            team.fixed_at(i, team.start_time, float(leg.mass[0]), path.duration),
+            leg,
+            float(cost),
+            attempt.level,
+            answer.status,
+        )
+        for i, (leg, cost) in enumerate(zip(path.legs, costs, strict=True))
+    ]
+    return TeamSolution(
+        team,
+        tuple(members),
+        team.names,
+        path.forces,
+        path.densities,
+        attempt.level.objective,
+        success,
+        status,
+        message,
+        tuple(climb.levels),
+        worst=() if success else _worst(team, worst_rows(program, answer, path)),
+        warnings=_warnings(team, path) if success else (),
+        tolerance=tol,
+        error=error,
+        reason=f"{len(members)} bodies on {len(path.mesh) - 1} steps",
+        provenance=about,
+    )
+
+
+def _member(problem: TransferProblem, path: Any, cost: float, level: Level, status: str) -> Solution:
+    dynamics = Dynamics.of(problem)
+    momentum, velocity = end_momenta(dynamics, path, problem.start_time)
+    return Solution(
+        problem=problem,
+        path=path,
+        **reported(path, velocity, momentum, force_of(dynamics, path)),
+        objective=problem.objective.sense * cost,
+        success=status == "solved",
+        status=status,
+        message="a body of a team",
+        ladder=(level,),
+        provenance=Provenance.of(problem),
+    )
+
+
+def _worst(team: Team, rows: Sequence[tuple[str, float, str]]) -> tuple[tuple[str, float, str], ...]:
+    """Violated rows with those at the nodes of two bodies as what they lack of their distance [m]."""
+    kept = {
+        f"{name}[": limit
+        for name, (part, *_) in zip(team.pair_names(), team.pairs(), strict=True)
+        if (limit := part.limit(team.dimension)) is not None
+    }
+    found = []
+    for name, size, unit in rows:
+        limit = next((limit for start, limit in kept.items() if name.startswith(start)), None)
+        found.append((name, *((size, unit) if limit is None else limit.violation(size, ""))))
+    return tuple(found)
+
+
+def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
+    found = []
+    bound = team.members[0].limit_of_duration(path.duration)
+    if bound is not None:
+        other = "shorter" if bound == "shortest" else "longer"
+        ends = f"the duration ends on its {bound} limit of {lasting(path.duration, 6)}"
+        found.append(f"{ends}: a {other} one may cost less")
+    worst = max(
+        (cut for cut in team_cuts(team, path) if len(cut.steps)), key=lambda cut: cut.value, default=None
+    )
+    if worst is not None:
+        found.append(f"{worst.name} is broken by {worst.value:.3g} m: try another guess or a finer mesh")
+    return tuple(found)

@@ -1,0 +1,128 @@
+"""The path of a team: those of its bodies on one mesh, and what holds between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from dmoc.missions.path import MissionPath, cut_in_two
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_fractions, node_weights
+from dmoc.motion.path import DiscretePath
+from dmoc.scene.mission import Mission
+
+# Two bodies touch at a node whose multiplier is more than this part of the largest one [-].
+PUSHES = 1e-3
+# Steps that add up to less than this error, as a part of the path, need not be cut where two bodies touch [-].
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class TeamPath(MissionPath):
+    """The paths of all bodies, which stand on one mesh and last equally long.
+
+    Attributes
+    ----------
+    legs : tuple of DiscretePath
+        One a body.
+    begins : tuple of float
+        Time at the start [s], once a body.
+    forces : dict of array
+        Multipliers of rows at the end [objective per unit of the row], by the names of their groups.
+    densities : dict of array, shape (nodes, rows)
+        Multipliers of rows at the nodes per fraction of the duration, by the names of their groups.
+    """
+
+    densities: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.legs[0].duration
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Mass of all bodies at the nodes [kg]."""
+        return np.sum([leg.mass for leg in self.legs], axis=0)
+
+    @property
+    def mesh(self) -> np.ndarray:
+        """Step ends as fractions of the duration."""
+        return self.legs[0].mesh
+
+    @property
+    def order(self) -> int:
+        return self.legs[0].order
+
+    def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> TeamPath:
+        """The same on another mesh and order; there is one for all bodies."""
+        (mesh, order), *_ = meshes
+        old, new = self.legs[0].fractions, node_fractions(mesh, scheme(order))
+        moved = {
+            name: np.stack([np.interp(new, old, column) for column in values.T], axis=1)
+            for name, values in self.densities.items()
+        }
+        return replace(self, legs=tuple(leg.onto(mesh, order, leg.hold) for leg in self.legs), densities=moved)
+
+    def finer(self, errors: Sequence[np.ndarray]) -> TeamPath:
+        """The same on a mesh where the steps that err are cut in two, and those in which two bodies touch."""
+        summed = np.sum(errors, axis=0)
+        touched = self.touched()
+        if not len(touched) or summed.sum() > NOTHING:
+            (finer,) = cut_in_two(self.legs[:1], [summed])
+            return self.onto([finer]).cut(self.mesh, touched)
+        return self.cut(self.mesh, touched)
+
+    def cut(self, mesh: np.ndarray, steps: np.ndarray) -> TeamPath:
+        """The same with some steps of a mesh cut in two, where they are not yet."""
+        middles = 0.5 * (mesh[1:] + mesh[:-1])[steps]
+        return self.onto([(np.unique(np.concatenate([self.mesh, middles])), self.order)])
+
+    def touched(self) -> np.ndarray:
+        """The steps at whose nodes two bodies are as near as they may be: where rows push them apart.
+
+        The time at which they touch is none of the nodes', which costs about the square of the steps there.
+        """
+        pushes = [np.abs(values).max(axis=1) * self.weights for values in self.densities.values()]
+        if not pushes or not (largest := max(push.max() for push in pushes)):
+            return np.zeros(0, int)
+        nodes = np.flatnonzero(np.max(pushes, axis=0) > PUSHES * largest)
+        degree, last = scheme(self.order).degree, len(self.mesh) - 2
+        return np.unique(np.clip([nodes // degree, (nodes - 1) // degree], 0, last))
+
+    def stretched(self, mission: Any, factor: float) -> TeamPath:
+        """The same but so many times as long, within the bounds of a free duration."""
+        duration = float(np.clip(factor * self.duration, *mission.duration_bounds))
+        return replace(self, legs=tuple(replace(leg, duration=duration) for leg in self.legs))
+
+    def without_idle(self, mission: Mission, nothing: float) -> TeamPath:
+        """Itself: a team has no impulses."""
+        return self
+
+    @property
+    def weights(self) -> np.ndarray:
+        """The share of the duration that belongs to each node [-]."""
+        return node_weights(self.mesh, scheme(self.order))
+
+
+def between(path: TeamPath, pair: tuple[int, int]) -> DiscretePath:
+    """The path of the second of two bodies as the first one sees it: the differences of their places [m]."""
+    first, second = (path.legs[i] for i in pair)
+    speeds = [(leg.start_velocity, leg.goal_velocity) for leg in (first, second)]
+    (before, there), (behind, arriving) = (
+        [velocity[leg.coordinates.speeds] for velocity in each]
+        for leg, each in zip((first, second), speeds, strict=True)
+    )
+    return replace(
+        first,
+        position=second.place - first.place,
+        control=np.zeros((len(first.control), 0)),
+        start_velocity=behind - before,
+        goal_velocity=arriving - there,
+        multipliers={},
+        made_of=None,
+        reaction=None,
+    )
