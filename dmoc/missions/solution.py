@@ -13,7 +13,6 @@ import numpy as np
 from dmoc.basics.arguments import of_kind
 from dmoc.missions.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.moments import Moment, moment_of_legs
 from dmoc.results.netcdf import Format, Table, as_array, damage_told, read_table, write_table
 from dmoc.results.solution import Outcome, Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
@@ -124,13 +123,6 @@ class MissionSolution(Outcome):
         """Attitudes at all nodes, as of a `Solution`; None for a point mass."""
         found = [leg.attitude for leg in self.legs]
         return None if found[0] is None else np.concatenate([each for each in found if each is not None])
-
-    def at(self, t: Any) -> Moment:
-        """State, force and mass at any time [s], as of a `Solution`.
-
-        At a joint they are those behind it, at the begin of the next leg: after an impulse or a drop.
-        """
-        return moment_of_legs(self, t)
 
     @property
     def velocity_change(self) -> float:

@@ -13,16 +13,15 @@ from dmoc.results.moments import moving, step_places
 
 
 def node_table(solution: Any) -> Any:
-    """A DataFrame with a row a node; of a mission those of all legs, whose names stand first."""
+    """A DataFrame with a row a node; of legs or bodies those of all, whose names stand first."""
     import pandas
 
-    if not hasattr(solution, "legs"):
+    what = "leg" if hasattr(solution, "legs") else "body"
+    parts = getattr(solution, "legs", None) or getattr(solution, "members", None)
+    if parts is None:
         return pandas.DataFrame(_columns(solution))
-    tables = []
-    for leg in solution.legs:
-        table = pandas.DataFrame(_columns(leg))
-        table.insert(0, "leg", leg.provenance.problem_name)
-        tables.append(table)
+    names = getattr(solution, "names", None) or [one.provenance.problem_name for one in parts]
+    tables = [pandas.DataFrame({what: name} | _columns(one)) for name, one in zip(names, parts, strict=True)]
     return pandas.concat(tables, ignore_index=True)
 
 

@@ -94,7 +94,9 @@ def named_body(made: Coordinates, body: str) -> tuple[np.ndarray, np.ndarray]:
 def moment(solution: Any, t: Any) -> Moment:
     """`Solution.at`."""
     times = checked_times(solution, t)
-    return shaped(sampled(solution, times.ravel()), times.shape)
+    # Of no time at all the moment has the shape of that of one.
+    found = sampled(solution, times.ravel() if times.size else solution.time[:1])
+    return shaped(found, times.shape)
 
 
 def moment_of_legs(solution: Any, t: Any) -> Moment:
@@ -103,7 +105,9 @@ def moment_of_legs(solution: Any, t: Any) -> Moment:
     flat = times.ravel()
     begins = [leg.provenance.start_time for leg in solution.legs[1:]]
     which = np.searchsorted(begins, flat, side="right")
-    parts = [(which == i, sampled(leg, flat[which == i])) for i, leg in enumerate(solution.legs)]
+    parts = [(which == i, sampled(solution.legs[i], flat[which == i])) for i in np.unique(which)]
+    if not parts:
+        return moment(solution.legs[0], times)
     found: dict[str, Any] = {}
     for field in fields(Moment):
         first = getattr(parts[0][1], field.name)
@@ -137,8 +141,9 @@ def checked_times(solution: Any, t: Any) -> np.ndarray:
 def shaped(found: Moment, shape: tuple[int, ...]) -> Moment:
     """A moment whose arrays have this shape in place of their first axis."""
     arrays = {field.name: getattr(found, field.name) for field in fields(Moment)}
+    count = int(np.prod(shape))
     moved: dict[str, Any] = {
-        name: values.reshape((*shape, *values.shape[1:]))
+        name: values[:count].reshape((*shape, *values.shape[1:]))
         for name, values in arrays.items()
         if isinstance(values, np.ndarray)
     }

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from dmoc.basics.digits import lasting
+from dmoc.results.moments import moment, moment_of_legs
 
 if TYPE_CHECKING:
     from dmoc.results.facts import Level, Provenance
@@ -88,10 +89,21 @@ class Outcome:
             raise SolveError(f"{self.status}: {self.message}")
         return self
 
+    def at(self, t: Any) -> Any:
+        """State, force and mass at any time [s], as `Solution.at` has them.
+
+        Of a mission they are those of the leg in which the time lies. At a joint they are those behind it, at
+        the begin of the next leg: after an impulse or a drop, in that leg's frame. Of a team it is a dictionary
+        with the moment of each body by its name.
+        """
+        if hasattr(self, "members"):
+            return {name: moment(one, t) for name, one in zip(self.names, self.members, strict=True)}  # type: ignore[attr-defined]
+        return moment_of_legs(self, t)
+
     def table(self) -> Any:
         """A pandas DataFrame with a row a node: time, position, velocity, force, mass, each with its unit.
 
-        The force is that of the node; with hold it is that of the step behind it.
+        Of a mission or a team the first column names the leg or the body. The force is that of the node; with hold it is that of the step behind it.
         """
         return _shown("table")(self)
 
