@@ -103,7 +103,8 @@ class Outcome:
     def table(self) -> Any:
         """A pandas DataFrame with a row a node: time, position, velocity, force, mass, each with its unit.
 
-        Of a mission or a team the first column names the leg or the body. The force is that of the node; with hold it is that of the step behind it.
+        Of a mission or a team the first column names the leg or the body. The force is that of the node; with
+        hold it is that of the step behind it.
         """
         return _shown("table")(self)
 

@@ -35,7 +35,7 @@ def found():
 
 @pytest.fixture
 def saved(tmp_path, monkeypatch):
-    """A solution in a file, of a problem file in the working folder, with a parameter that is not the default."""
+    """A solution in a file, of a problem file in the working folder, one parameter not the default."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hop.py").write_text(HOP.format(extra=""))
     file = load_problem("hop.py")

@@ -1,4 +1,4 @@
-"""An answer between its nodes: of which order it is, what is flown there, and at which end of a joint it stands."""
+"""An answer between its nodes: its order, the force that is flown there, and on which side of a joint it is."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from dmoc import (
 from dmoc.basics.quaternions import angle_between
 from dmoc.scene.problem_file import load_problem
 
-# An ellipse with this eccentricity around an attractor with mu = 1 m^3/s^2, from the periapsis on, and how long.
+# An ellipse around an attractor with mu = 1 m^3/s^2: its eccentricity, and the time from the periapsis on [s].
 E, LASTS = 0.3, 3.0
 
 
@@ -58,7 +58,7 @@ def least_time(**numerics):
     return solve(problem, structure=False, **numerics)
 
 
-# Nodes inside a step are of order s + 2, its ends of order 2 s, and a slope is one order less than what it is of.
+# Nodes inside a step are of order s + 2, its ends of order 2 s; a slope is one order less than what it is of.
 @pytest.mark.parametrize(
     "order, meshes, of_place, of_speed",
     [(2, (40, 80), 2, 2), (4, (16, 32), 4, 3), (6, (8, 16), 5, 4), (8, (5, 10), 6, 5)],
