@@ -23,13 +23,14 @@ def attached_as_named(solution: Any) -> Any:
     """
     known = solution.provenance
     source = named(known.problem_name, known.source_hash) if known.source_hash else None
-    path = None if source is None else find(source)
-    if path is not None and hashlib.sha256(path.read_bytes()).hexdigest() == known.source_hash:
+    if source is None:
+        solution.require_problem()  # says that there is none, and what to do
+    path = find(str(source))
+    if hashlib.sha256(path.read_bytes()).hexdigest() == known.source_hash:
         return attached_from(load_problem(str(source)), solution)
-    why = ", nor name its file" if path is None else f", and {path} is no longer what it was made from"
     raise ValueError(
-        f"this solution was loaded from a file and does not hold its problem {known.problem_name!r}{why}; "
-        "use solution.attach(problem) first"
+        f"this solution was loaded from a file and does not hold its problem {known.problem_name!r}, and {path} "
+        "is no longer what it was made from; use solution.attach(problem) first"
     )
 
 

@@ -124,7 +124,7 @@ def test_a_problem_file_that_was_changed_is_not_run(saved):
 
 def test_what_names_no_file_says_so(found, tmp_path):
     found.save(tmp_path / "hop.nc")
-    with pytest.raises(ValueError, match=r"does not hold its problem 'a <hop>', nor name its file"):
+    with pytest.raises(ValueError, match=r"does not hold its problem 'a <hop>'; use solution\.attach"):
         verify(load(tmp_path / "hop.nc"))
     assert verify(load(tmp_path / "hop.nc"), found.problem).ok
 
