@@ -29,8 +29,8 @@ def attached_as_named(solution: Any) -> Any:
     if hashlib.sha256(path.read_bytes()).hexdigest() == known.source_hash:
         return attached_from(load_problem(str(source)), solution)
     raise ValueError(
-        f"this solution was loaded from a file and does not hold its problem {known.problem_name!r}, and {path} "
-        "is no longer what it was made from; use solution.attach(problem) first"
+        f"this solution was loaded from a file and does not hold its problem {known.problem_name!r}, and "
+        f"{path} is no longer what it was made from; use solution.attach(problem) first"
     )
 
 
