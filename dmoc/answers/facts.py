@@ -2,70 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dmoc.answers.along import least, pushes, swept
+from dmoc.answers.fact import Fact, Facts
 from dmoc.answers.orbits import osculating
 from dmoc.basics.digits import lasting, quantity
+from dmoc.basics.quaternions import angle_between
 
 # A force or a change of mass that is less than this part of what there could be is none [-].
 NONE = 1e-9
 # Two times, or a path and a zone, are as good as together within this part of the duration, or of the path [-].
 NEAR = 1e-6
-
-
-@dataclass(frozen=True)
-class Fact:
-    """One number that is asked of an answer: its name, value and unit, the line it stands in, and its words."""
-
-    name: str
-    value: float
-    unit: str
-    line: str
-    words: str
-
-
-class Facts(Mapping[str, Fact]):
-    """Facts of one answer by their names; printed, a table of few lines."""
-
-    def __init__(self, found: Iterable[Fact]):
-        self._found = {fact.name: fact for fact in found}
-
-    def __getitem__(self, name: str) -> Fact:
-        if name not in self._found:
-            raise KeyError(f"{name!r}; there are {', '.join(map(repr, self._found)) or 'none'}")
-        return self._found[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
-
-    def __len__(self) -> int:
-        return len(self._found)
-
-    def lines(self) -> list[tuple[str, str]]:
-        """What a report shows: the name of each line and what stands in it."""
-        found: dict[str, list[str]] = {}
-        for fact in self._found.values():
-            found.setdefault(fact.line, []).append(fact.words)
-        return [(line, ", ".join(words)) for line, words in found.items()]
-
-    def __repr__(self) -> str:
-        """A line each."""
-        lines = self.lines()
-        width = max((len(line) for line, _ in lines), default=0)
-        return "\n".join(f"{line:{width}}  {words}" for line, words in lines) or "no facts"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        from html import escape
-
-        rows = (f"<tr><th>{escape(line)}</th><td>{escape(words)}</td></tr>" for line, words in self.lines())
-        return f"<table>{''.join(rows)}</table>"
 
 
 def facts_of(solution: Any) -> Facts:
@@ -90,6 +43,7 @@ def _of_transfer(solution: Any) -> list[Fact]:
         *_velocity_change(change, _rocket(solution), 0),
         *_propellant(problem.mass, problem.mass - solution.final_mass),
         *_largest(force, torque),
+        *_turning([solution]),
         *_approach(_approaches(solution)),
         *_revolutions(_angle(solution)),
         *_clearance(_clearances(solution)),
@@ -120,6 +74,7 @@ def _of_mission(solution: Any) -> list[Fact]:
         *_velocity_change(change, burnt + solution.velocity_change if burnt else None, kicks),
         *_propellant(mission.mass, mission.mass - mission.dropped - solution.final_mass),
         *_largest(max(one[1] for one in known), max(one[2] for one in known)),
+        *_turning(legs),
         *_approach(approaches),
         *_revolutions(None if None in angles else sum(angles)),  # type: ignore[arg-type]
         *_clearance([found for leg in legs for found in _clearances(leg)]),
@@ -177,6 +132,32 @@ def _largest(force: float, torque: float) -> list[Fact]:
     """The largest force and torque that are flown, between nodes too."""
     found = [("peak force", force, "N"), ("peak torque", torque, "N m")]
     return [Fact(name, x, unit, "peak", f"{name[5:]} {quantity(x, unit)}") for name, x, unit in found if x]
+
+
+def _turning(legs: Sequence[Any]) -> list[Fact]:
+    """How far a body turns from its start and how fast, and what its reaction wheels do at most."""
+    if legs[0].rate is None:
+        return []
+    quaternions = np.concatenate([leg.attitude for leg in legs])
+    turn = float(np.degrees(angle_between(quaternions[:1], quaternions).max()))
+    rate = max(float(np.linalg.norm(leg.rate, axis=1).max()) for leg in legs)
+    found = [
+        Fact("turn", turn, "degrees", "turn", f"up to {turn:.4g} degrees"),
+        Fact("peak rate", rate, "rad/s", "turn", f"rate up to {np.degrees(rate):.4g} degrees/s"),
+    ]
+    if legs[0].wheel_momentum is None:
+        return found
+    stored, motors = (
+        max(float(np.abs(getattr(leg, name)).max()) for leg in legs)
+        for name in ("wheel_momentum", "wheel_torque")
+    )
+    return [
+        *found,
+        Fact("peak wheel torque", motors, "N m", "each wheel", f"torque up to {quantity(motors, 'N m')}"),
+        Fact(
+            "peak wheel momentum", stored, "N m s", "each wheel", f"momentum up to {quantity(stored, 'N m s')}"
+        ),
+    ]
 
 
 def _controls(solution: Any) -> list[Fact]:
@@ -239,8 +220,6 @@ def _clearances(solution: Any) -> list[tuple[float, str, str]]:
     """The least clearance from each zone [m], when, and the zone's name, between nodes too."""
     made, found = solution.path.coordinates, []
     for i, zone in enumerate(solution.problem.constraints):
-        if zone.turns_body or zone.limits_speed or zone.limits_joint or not solution.dimension:
-            continue
         here = partial(_clear, made, zone)
         if here(solution.time[:1], solution.path.position[:1]) is not None:
             distance, time = least(solution, here)

@@ -119,7 +119,7 @@ def test_a_problem_file_that_was_changed_is_not_run(saved):
         ):
             ask(load(saved))
     html = load(saved)._repr_html_()
-    assert picture(html).size and "Solution of &#x27;hop&#x27;: objective" in html and "check" not in html
+    assert picture(html).size and "<p>Solution of &#x27;hop&#x27;: objective" in html and "check" not in html
 
 
 def test_what_names_no_file_says_so(found, tmp_path):

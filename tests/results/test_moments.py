@@ -151,7 +151,7 @@ def test_a_body_turns_by_unit_quaternions(order):
     x = np.linspace(0, 1, 301)
     at, angle = found.at(3.0 * x), 2.0 * x**2 * (3 - 2 * x)
     half = np.stack([np.cos(angle / 2), 0 * x, 0 * x, np.sin(angle / 2)], axis=1)
-    np.testing.assert_allclose(np.linalg.norm(at.attitude, axis=1), 1, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(at.attitude, axis=1), 1, rtol=1e-14)
     near = 2e-3 if order == 2 else 5e-6
     assert angle_between(at.attitude, half).max() < near
     np.testing.assert_allclose(at.rate[:, 2], 4.0 * x * (1 - x), atol=near)
