@@ -142,22 +142,14 @@ def _turning(legs: Sequence[Any]) -> list[Fact]:
     turn = float(np.degrees(angle_between(quaternions[:1], quaternions).max()))
     rate = max(float(np.linalg.norm(leg.rate, axis=1).max()) for leg in legs)
     found = [
-        Fact("turn", turn, "degrees", "turn", f"up to {turn:.4g} degrees"),
-        Fact("peak rate", rate, "rad/s", "turn", f"rate up to {np.degrees(rate):.4g} degrees/s"),
+        Fact("turn", turn, "degrees", "peak", f"turn {turn:.4g} degrees"),
+        Fact("peak rate", rate, "rad/s", "peak", f"rate {np.degrees(rate):.4g} degrees/s"),
     ]
-    if legs[0].wheel_momentum is None:
-        return found
-    stored, motors = (
-        max(float(np.abs(getattr(leg, name)).max()) for leg in legs)
-        for name in ("wheel_momentum", "wheel_torque")
-    )
-    return [
-        *found,
-        Fact("peak wheel torque", motors, "N m", "each wheel", f"torque up to {quantity(motors, 'N m')}"),
-        Fact(
-            "peak wheel momentum", stored, "N m s", "each wheel", f"momentum up to {quantity(stored, 'N m s')}"
-        ),
-    ]
+    for name, unit in (("wheel_torque", "N m"), ("wheel_momentum", "N m s")):
+        if getattr(legs[0], name) is not None:
+            most, words = max(float(np.abs(getattr(leg, name)).max()) for leg in legs), name.replace("_", " ")
+            found.append(Fact(f"peak {words}", most, unit, "peak", f"{words} {quantity(most, unit)}"))
+    return found
 
 
 def _controls(solution: Any) -> list[Fact]:
