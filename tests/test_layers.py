@@ -30,7 +30,7 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports", "answers"],
+    ["studies", "sweeps", "exports", "answers", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
     ["notebook"],
