@@ -31,9 +31,10 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports", "conversions", "sensitivity"],
+    ["studies", "sweeps", "exports", "conversions", "answers", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
+    ["notebook"],
     ["cli"],
 ]
 FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}
