@@ -20,6 +20,7 @@ from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.results.wrong_way import in_two_pieces, turned_round
 from dmoc.scene.mission import Mission
 from dmoc.solver.rung import cut_short
 
@@ -33,6 +34,22 @@ def answered(
         found = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
     return _answered(climb, attempt, error, met, tol)
+
+
+def straightened(climb: Any, attempt: Any, most: int) -> Any:
+    """An attempt, or one in at most so many iterations in which no thrust along a line points the wrong way."""
+    if not any(map(in_two_pieces, climb.mission.stretches)):
+        return attempt
+
+    def legs_of(one: Any) -> tuple[Sequence[Solution], float]:
+        found = _answered(climb, one, None, True, None)
+        return found.legs, found.objective
+
+    def again(legs: list) -> Any:
+        other = climb.attempt(replace(attempt.path, legs=tuple(legs), forces={}), most=most)
+        return other if other.solved else None
+
+    return turned_round(attempt, legs_of, again, climb.mission.objective.sense)
 
 
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:

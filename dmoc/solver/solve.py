@@ -9,6 +9,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
+from dmoc.results.wrong_way import turned_round
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
@@ -46,6 +47,14 @@ def solve(
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
         solution = _solved(ladder, order, steps, tol, hold, mesh, guess)
+
+        def again(paths: list[DiscretePath]) -> Solution | None:
+            other = _solved(ladder, order, steps, tol, hold, mesh, *paths)
+            return other if other.optimal else None
+
+        if solution.optimal:
+            sense = problem.objective.sense
+            solution = turned_round(solution, lambda one: ((one,), one.objective), again, sense)
         # To solve again from the program's own guess would take longer than the warm start from an answer of
         # this process; of one from a file nobody knows what it answers.
         former = own is None or isinstance(own, DiscretePath) or getattr(own, "problem", None) is not None
