@@ -52,6 +52,8 @@ class MissionPath:
 
     def as_arrays(self) -> tuple[np.ndarray, np.ndarray]:
         """Times [s] and positions of the nodes of all legs; where legs meet the later one counts."""
+        if not (np.diff(self.begins) > 0).all():
+            raise ValueError("guess is of several bodies at one time; give that of one of them")
         parts = zip(self.begins, self.legs, strict=True)
         times = np.concatenate([begin + leg.duration * leg.fractions for begin, leg in parts])
         last = np.append(np.diff(times) > 0, True)

@@ -26,6 +26,11 @@ WORTH = 1e-2
 # Thrusts are turned round at most so many times.
 MOST_TURNED = 3
 Found = TypeVar("Found")
+# What to try where no answer is found: limits that would be enough are not to blame then.
+STUCK = (
+    "along a line an engine with a throttle floor pushes one way or the other, and only at a node can it turn "
+    "round: give a Mission with a Leg for each burn, of free durations, or min_thrust=0"
+)
 
 
 def in_two_pieces(problem: TransferProblem) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
@@ -9,10 +10,10 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
-from dmoc.results.wrong_way import turned_round
+from dmoc.results.wrong_way import STUCK, in_two_pieces, turned_round
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
-from dmoc.solver.ladder import Ladder
+from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
 from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
@@ -55,6 +56,8 @@ def solve(
         if solution.optimal:
             sense = problem.objective.sense
             solution = turned_round(solution, lambda one: ((one,), one.objective), again, sense)
+        elif in_two_pieces(problem) and solution.status in UNEXPLAINED:
+            return replace(solution, message=STUCK)
         # To solve again from the program's own guess would take longer than the warm start from an answer of
         # this process; of one from a file nobody knows what it answers.
         former = own is None or isinstance(own, DiscretePath) or getattr(own, "problem", None) is not None

@@ -8,7 +8,21 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from dmoc import Drop, Engine, FinalHeight, FinalMass, Free, Leg, Mission, State, TransferProblem, solve, verify
+from dmoc import (
+    Drop,
+    Engine,
+    FinalHeight,
+    FinalMass,
+    Free,
+    Leg,
+    Mission,
+    State,
+    Time,
+    TransferProblem,
+    UniformGravity,
+    solve,
+    verify,
+)
 
 EXHAUST = 100.0  # m/s
 
@@ -64,3 +78,13 @@ def test_thrusts_that_point_the_wrong_way_are_turned_round_and_else_told(hold):
     check = next(check for check in verify(wrong).checks if check.name == "optimality")
     assert not check.ok
     assert "thrusts along the line point the wrong way" in check.note
+
+
+def test_a_reversal_between_nodes_is_told_and_is_found_as_two_legs():
+    parts = dict(effects=[UniformGravity((-0.3,))], actuator=Engine(1.0, min_thrust=1.0), objective=Time())
+    ends = State((0,), (0,)), State((-5,), (0,))
+    stuck = solve(TransferProblem(1.0, *ends, (1.0, 20.0), **parts), order=4, steps=10)
+    assert "give a Mission with a Leg for each burn" in stuck.message
+    found = solve(Mission(1.0, *ends, [Leg((0.1, 20.0)), Leg((0.1, 20.0))], **parts))
+    # down with 1.3 m/s^2, then up with 0.7 m/s^2
+    assert found.duration == pytest.approx(np.sqrt(2 * 5 * 0.7 / 1.3 / 2.0) * (1 + 1.3 / 0.7), rel=1e-4)
