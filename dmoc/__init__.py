@@ -132,6 +132,13 @@ if TYPE_CHECKING:
     from dmoc.scene.mission import Mission as Mission
     from dmoc.scene.problem import TransferProblem as TransferProblem
     from dmoc.scene.team import Team as Team
+    from dmoc.sensitivity.dispersion import Dispersion as Dispersion
+    from dmoc.sensitivity.dispersion import disperse as disperse
+    from dmoc.sensitivity.predict import predict as predict
+    from dmoc.sensitivity.symmetries import Symmetry as Symmetry
+    from dmoc.sensitivity.symmetries import symmetries as symmetries
+    from dmoc.sensitivity.worth import Worth as Worth
+    from dmoc.sensitivity.worth import worth as worth
     from dmoc.structure.front import load as load
     from dmoc.structure.front import solve as solve
     from dmoc.structure.front import verify as verify

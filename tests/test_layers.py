@@ -30,7 +30,7 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports"],
+    ["studies", "sweeps", "exports", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
     ["cli"],

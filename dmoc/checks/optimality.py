@@ -9,10 +9,9 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.mesh import node_weights
-from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
 from dmoc.nlp.solving import NLP
-from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 
 # Where a node has less than this part of the mean share of the time, it counts as that [-]: the solver ends
@@ -98,24 +97,7 @@ def _unassembled(evidence: Evidence) -> tuple[NLP, list]:
         forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)], bool)
         raised = np.maximum(np.abs(path.control), evidence.typical_force)
         path = replace(path, control=np.where(forces, raised, path.control))
-    units = units_of(problem, path)
-    script = Placement(
-        problem, stencils_of(problem, path.order, path.hold), evidence.rule, path.hold, path.mesh, units
-    )
-    derivatives: Any = None
-    nlp = NLP(
-        problem,
-        evidence.dynamics,
-        evidence.rule,
-        path.hold,
-        path.mesh,
-        units,
-        script.columns,
-        script.rows,
-        script.row_bounds,
-        derivatives,
-    )
-    return nlp, script.blocks
+    return unassembled(problem, path, units_of(problem, path))
 
 
 def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.ndarray) -> tuple:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from dmoc.cli import disperse as disperse_command
 from dmoc.cli import new as new_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -29,6 +30,7 @@ from dmoc.cli.options import (
     Source,
     Steps,
     Version,
+    Worth,
     attached,
     ends_at_once,
     fail,
@@ -148,14 +150,14 @@ def simulate(
 
 
 @app.command(epilog="Example: dmoc check flight.nc")
-def check(file: File, source: Source = None, as_json: Json = False) -> None:
+def check(file: File, source: Source = None, worth: Worth = False, as_json: Json = False) -> None:
     """Check a saved solution again, against its problem file."""
     from dmoc.structure.front import verify
 
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
         verdict = verify(solution)
-    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED)
+    show_answer(solution, verdict, as_json, stopped=NOT_SOLVED, with_worth=worth)
 
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
@@ -241,6 +243,10 @@ def doctor() -> None:
 
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (
+        disperse_command.disperse,
+        "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),
     (stability_command.stability, "dmoc stability --revolutions 1000 --plot stability.png"),

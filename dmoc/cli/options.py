@@ -86,6 +86,10 @@ Structure = Annotated[
 Impulses = Annotated[
     str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")
 ]
+Worth = Annotated[
+    bool,
+    switch("--worth", help="Also say what every number of the problem is worth: derivatives of the objective."),
+]
 Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]
@@ -208,18 +212,25 @@ def show_answer(
     quiet: bool = False,
     written: Sequence[Path] = (),
     stopped: int = INTERRUPTED,
+    with_worth: bool = False,
 ) -> None:
-    """Print the answer and exit with the code that says what it is worth."""
+    """Print the answer and exit with the code that says how good it is."""
+    found: tuple = ()
+    if with_worth and solution.optimal and (as_json or not quiet):
+        from dmoc.reports.worth import worth_told
+
+        found = worth_told(solution)
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        print(report_json.as_text(report_json.solve_object(solution, verdict)))
+        more = found[0] if found else {}
+        print(report_json.as_text(report_json.solve_object(solution, verdict) | more))
     else:
         from dmoc.reports import words as report
 
         if solution.optimal and verdict is not None:
             # A single line stays one, however wide the terminal is.
-            report.console().print(report.answer(solution, verdict, quiet, written), soft_wrap=quiet)
+            report.console().print(report.answer(solution, verdict, quiet, written, found[1:]), soft_wrap=quiet)
         else:
             report.console().print(report.failure(solution, quiet, written))
     if not solution.optimal:

@@ -19,6 +19,7 @@ from dmoc.cli.options import (
     Settings,
     Steps,
     Structure,
+    Worth,
     best_start,
     ends_at_once,
     problem_of,
@@ -29,6 +30,10 @@ from dmoc.cli.options import (
 )
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
+
+Compiled = Annotated[
+    bool, switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept.")
+]
 
 
 def solve(
@@ -57,10 +62,8 @@ def solve(
         typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
     ] = None,
     as_json: Json = False,
-    compiled: Annotated[
-        bool,
-        switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept."),
-    ] = False,
+    compiled: Compiled = False,
+    worth: Worth = False,
     quiet: Quiet = False,
 ) -> None:
     """Solve a problem, check the answer, show both."""
@@ -91,4 +94,5 @@ def solve(
         save_figure(solution, plot, verdict)
     if animate is not None:
         dmoc.animate(solution, animate)
-    show_answer(solution, verdict, as_json, quiet, [path for path in (out, plot, animate) if path is not None])
+    written = [path for path in (out, plot, animate) if path is not None]
+    show_answer(solution, verdict, as_json, quiet, written, with_worth=worth)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -183,26 +183,42 @@ def _found(extremal: Extremal) -> tuple[np.ndarray | None]:
 def first_costate(extremal: Extremal) -> np.ndarray | None:
     """The costate at the start with which the motion ends at the best place of the goal; None if none is found.
 
-    The search begins with a coast. The limit of the thrust is switched on when the goal is nearly met.
+    The search begins with a coast around the bare attractor: with oblateness and other bodies there are paths
+    on which the effort is stationary that take twice as much, and a coast leads to them. The limit of the
+    thrust is switched on when the goal is nearly met.
     """
+    problem, coast = extremal.problem, np.zeros(len(extremal.scales))
+    bare = tuple(effect for effect in problem.effects if effect.attractor() is not None)
+    known = None
+    if problem.attraction.lone is not None and len(bare) < len(problem.effects):
+        alone = replace(extremal, problem=replace(problem, effects=bare))
+        known = _searched(alone, coast, False, MET)
+    stages = (False, True) if problem.actuator.force_limit() is not None else (False,)
+    # Where what disturbs the orbit is so strong that this leads nowhere, the coast itself has to do.
+    for begin in (coast,) if known is None else (known, coast):
+        costate: np.ndarray | None = begin
+        for limited in stages:
+            if costate is not None:
+                costate = _searched(extremal, costate, limited, MET if limited == stages[-1] else ROUGHLY_MET)
+        if costate is not None:
+            return costate
+    return None
+
+
+def _searched(extremal: Extremal, costate: np.ndarray, limited: bool, enough: float) -> np.ndarray | None:
+    """The costate at the start from which the goal is met so well, shot after shot; None if there is none."""
     goal = _goal_rows(extremal)
-    costate = np.zeros(len(extremal.scales))
-    stages = (False, True) if extremal.problem.actuator.force_limit() is not None else (False,)
-    for limited in stages:
-        enough = MET if limited == stages[-1] else ROUGHLY_MET
-        for _ in range(MOST_SHOTS):
-            try:
-                change, miss, slope = extremal.shot(costate, limited).correction(goal)
-            except (RuntimeError, np.linalg.LinAlgError):
-                # The body falls into the attractor, or a thrust at its limit all along cannot be changed.
-                return None
-            if miss < enough and (slope < STATIONARY or enough > MET):
-                break
-            costate = costate + change
-        else:
-            # The goal is met, but the best place on it is many revolutions away: the solver goes on from here.
-            return costate if miss < CLOSE else None
-    return costate
+    for _ in range(MOST_SHOTS):
+        try:
+            change, miss, slope = extremal.shot(costate, limited).correction(goal)
+        except (RuntimeError, np.linalg.LinAlgError):
+            # The body falls into the attractor, or a thrust at its limit all along cannot be changed.
+            return None
+        if miss < enough and (slope < STATIONARY or enough > MET):
+            return costate
+        costate = costate + change
+    # The goal is met, but the best place on it is many revolutions away: the solver goes on from here.
+    return costate if miss < CLOSE else None
 
 
 def _goal_rows(extremal: Extremal) -> ca.Function:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from dmoc.ends.base import Boundary
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import MOST_BENT, Spiral
 from dmoc.guess.winding import Winding
+from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
 
 # A spiral to an open orbit is made this many times: the place where it arrives is put onto that orbit and is
@@ -25,6 +27,8 @@ NEARLY_ROUND = 0.3
 # An orbit is not changed evenly into another if the cosine of the angle between their angular momenta is below
 # this [-]: their bodies turn in nearly opposite senses.
 OPPOSITE = -0.9
+# So many revolutions more are tried where another number of them may be better.
+OTHER_TURNS = (1, -1, 2, -2)
 
 
 def end_estimates(problem: TransferProblem, duration: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -98,6 +102,30 @@ def windings_between(problem: TransferProblem, duration: float, states: Any, mor
     found = [(partial(positions, winding), winding.turns) for winding in windings]
     sure = abs(windings[0].bend) <= MOST_BENT and windings[0].eccentricity < NEARLY_ROUND
     return [(*winding, sure) for winding in found]
+
+
+def with_more_turns(problem: TransferProblem, base: DiscretePath, turns: int) -> DiscretePath:
+    """A path around a lone attractor with so many revolutions more: evenly changed orbits, or itself turned."""
+    lone = problem.attraction.lone
+    assert lone is not None
+    center = lone.place(problem.dimension)
+    ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
+    windings = windings_between(problem, base.duration, ends, turns)
+    turned = center + turned_around(base.position - center, turns * base.fractions)
+    return replace(base, position=windings[0][0](base.fractions) if windings else turned)
+
+
+def change_without_phase(problem: TransferProblem, states: Any) -> float | None:
+    """The velocity change of an even change of one orbit into another, whatever the phase [m/s].
+
+    None where `windings_between` has no such path.
+    """
+    if not windings_between(problem, problem.duration_bounds[0], states, 0):
+        return None
+    attractor = problem.attraction.lone
+    assert attractor is not None
+    start, goal = _from_center(problem, attractor, states)
+    return Winding(attractor.mu, problem.duration_bounds[0], start, goal).velocity_change
 
 
 def _from_center(problem: TransferProblem, attractor: Attractor, states: Any) -> list[tuple]:
@@ -174,3 +202,15 @@ def _direction(x: np.ndarray) -> np.ndarray:
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b))
+
+
+def turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Positions around the origin, each turned by its number of `turns` in the plane of the motion."""
+    padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
+    normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)
+    normal = normal / (np.linalg.norm(normal) or 1.0)
+    angle = 2 * np.pi * turns[:, None]
+    # Rodrigues' formula
+    along = normal * (padded @ normal)[:, None]
+    turned = np.cos(angle) * padded + np.sin(angle) * np.cross(normal, padded) + (1 - np.cos(angle)) * along
+    return turned[:, : offset.shape[1]]

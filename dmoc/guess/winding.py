@@ -63,6 +63,13 @@ class Winding:
         """Whether there is a way at all: from a place to itself there is none without a revolution."""
         return self._time(self.turns) > 0
 
+    @property
+    def velocity_change(self) -> float:
+        """Mean thrust per unit mass (root mean square) times the duration, if no phase were to be met [m/s]."""
+        (first, _), (last, _) = self._ends
+        fast, slow = first[0] ** -0.5, last[0] ** -0.5
+        return float(np.sqrt(self.mu * (fast**2 + slow**2 - 2 * fast * slow * np.cos(self._angle))))
+
     @cached_property
     def bend(self) -> float:
         """How much earlier than evenly the orbit changes [-]; beyond 0.9 it goes above or below both."""

@@ -68,6 +68,8 @@ ALWAYS: dict[str, Any] = {
     "calc_lam_p": False,
     "print_time": False,
     "error_on_fail": False,
+    # Ipopt cuts a step to where the functions are finite: nobody need be told.
+    "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.linear_solver": "mumps",

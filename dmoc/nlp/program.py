@@ -73,6 +73,12 @@ class Program:
 
     def bounds(self, problem: TransferProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""
+        low, high = (side.copy() for side in self.row_bounds)
+        self._release(problem, low, high)
+        return *self.column_bounds(problem), low, high
+
+    def column_bounds(self, problem: TransferProblem) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of the unknowns."""
         lower, upper = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
 
         def put(name: str, low, high) -> None:
@@ -94,9 +100,7 @@ class Program:
             _fix(lower, upper, places, position - origin)
             _fix(lower, upper, self.columns[f"{name}.velocity"].indices[:, 0], velocity)
         scale = self.columns.scales()
-        low, high = (side.copy() for side in self.row_bounds)
-        self._release(problem, low, high)
-        return lower / scale, upper / scale, low, high
+        return lower / scale, upper / scale
 
     def _walls(self, problem: TransferProblem) -> list[np.ndarray]:
         """Lower and upper bounds of the coordinates, by the boxes that places keep to."""

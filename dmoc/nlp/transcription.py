@@ -15,7 +15,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import assemble
+from dmoc.nlp.assembly import Block, assemble
 from dmoc.nlp.layout import Stencils
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.solving import NLP
@@ -109,6 +109,17 @@ def _transcribed(
     assembly = assemble(placed.blocks, *scales, stencils.parameter_count, compiled)
     numbers = units, columns, rows, placed.row_bounds, assembly
     return NLP(problem, dynamics, rule, guess.hold, guess.mesh, *numbers, chart=chart)
+
+
+def unassembled(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[NLP, list[Block]]:
+    """The NLP on the mesh of a path, and its blocks, without the sparse derivatives that a solve needs."""
+    rule, stencils = scheme(path.order), stencils_of(problem, path.order, path.hold)
+    placed = Placement(problem, stencils, rule, path.hold, path.mesh, units)
+    derivatives: Any = None
+    layouts = placed.columns, placed.rows, placed.row_bounds
+    dynamics = Dynamics.of(problem)
+    nlp = NLP(problem, dynamics, rule, path.hold, path.mesh, units, *layouts, derivatives)
+    return nlp, placed.blocks
 
 
 def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:

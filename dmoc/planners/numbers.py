@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -33,6 +33,9 @@ CALLED = {
     "most_torque": "torque_limit",
     "momenta": "wheel_momentum",
 }
+
+# All bodies of a team have these numbers in common.
+SHARED = ("duration", "durations", "start_time")
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class Numbers:
         """Those of a transfer."""
 
         def taken(problem: TransferProblem) -> list[np.ndarray]:
-            return [*nlp.bounds(problem)[:2], nlp.parameters(problem)]
+            return [*nlp.column_bounds(problem), nlp.parameters(problem)]
 
         return cls(nlp.problem, numbers_of(nlp.problem), taken)
 
@@ -126,6 +129,31 @@ def numbers_of(problem: TransferProblem) -> Iterator[Number]:
     own = {"mass": ("mass", "mass at the start", "kg"), "start_time": ("start_time", "time at the start", "s")}
     for field, (name, words, unit) in (own | {"duration": (*duration, "s")}).items():
         yield _number(problem, field, name, Term(unit, words), lambda twin: twin)
+
+
+def numbers_of_team(team: Any, names: Sequence[str]) -> Iterator[Number]:
+    """All numbers a team states: of each body by its name, and once the times that all of them share."""
+    for place, (member, name) in enumerate(zip(team.members, names, strict=True)):
+        for number in numbers_of(member):
+            if number.name in SHARED:
+                if place == 0:
+                    yield replace(number, changed=partial(_all_changed, team, number.changed))
+                continue
+            words = f"{name.replace('_', ' ')}: {number.term.words}"
+            changed = partial(_one_changed, team, place, number.changed)
+            yield Number(f"{name}_{number.name}", number.value, Term(number.term.unit, words), changed)
+
+
+def _all_changed(team: Any, changed: Callable[[np.ndarray], Any], values: np.ndarray) -> Any:
+    times = {name: getattr(changed(values), name) for name in ("start_time", "duration")}
+    members = team.members
+    for name, value in times.items():
+        members = tuple(_with(member, name, value) for member in members)
+    return _with(team, "members", members)
+
+
+def _one_changed(team: Any, place: int, changed: Callable[[np.ndarray], Any], values: np.ndarray) -> Any:
+    return _with_entry(team, "members", place, changed(values))
 
 
 def numbers_of_mission(mission: Any, names: Sequence[str]) -> Iterator[Number]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.plain import finite
@@ -11,6 +12,8 @@ from dmoc.reports.verdict import accuracy
 if TYPE_CHECKING:
     from dmoc.checks.verification import Report
     from dmoc.results.solution import Solution
+    from dmoc.sensitivity.dispersion import Dispersion
+    from dmoc.sensitivity.worth import Worth
 
 
 def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
@@ -98,6 +101,37 @@ def _of_team(solution: Any) -> dict[str, Any]:
             for b in names[i + 1 :]
             for apart in [solution.distance(a, b)]
         ],
+    }
+
+
+def worth_object(found: dict[str, Worth]) -> dict[str, Any]:
+    """For JSON: of each number its worth, the unit of that, the number itself with its unit, and the range."""
+    return {
+        name: {
+            "value": one.value,
+            "unit": one.unit,
+            "range": None if one.range is None else list(one.range),
+            "number": one.number,
+            "number_unit": one.of,
+        }
+        for name, one in found.items()
+    }
+
+
+def dispersion_object(found: Dispersion, solution: Any) -> dict[str, Any]:
+    """For JSON: spread at the end, miss of the planned end, and of each limit how often it is broken."""
+    axes = found.position.shape[2]
+    spread = {
+        name: {"position": list(map(float, sigma[-1][:axes])), "velocity": list(map(float, sigma[-1][axes:]))}
+        for name, sigma in (("linear", found.sigma), ("sampled", found.sampled_sigma))
+    }
+    return {
+        "problem": solution.provenance.problem_name,
+        "samples": found.samples,
+        "seed": found.seed,
+        "sigma_at_end": spread,
+        "miss": [{"part": part, "position": place, "velocity": speed} for part, place, speed in found.miss],
+        "limits": {name: asdict(chance) for name, chance in found.chances.items()},
     }
 
 

@@ -20,6 +20,7 @@ REMEDIES = {
     "ledger": FINER,
     "bounds": FINER,
     "optimality": SHARPER,
+    "joints": SHARPER,
     "together": FINER,
     "stability": "more steps: h omega must come below the limit of the order",
 }

@@ -125,9 +125,13 @@ def checks(report: Report) -> RenderableType:
 
 
 def answer(
-    solution: Solution, report: Report, quiet: bool = False, written: Sequence[Path] = ()
+    solution: Solution,
+    report: Report,
+    quiet: bool = False,
+    written: Sequence[Path] = (),
+    more: Sequence[RenderableType] = (),
 ) -> RenderableType:
-    """What a solve that succeeded shows: ladder, checks, files, and one line that sums it up."""
+    """What a solve that succeeded shows: ladder, checks, `more`, files, and one line that sums it up."""
     total = solution.build_s + solution.solve_s + report.seconds
     found = f"Solved, a local optimum: {figures(solution)} ({solution.iterations} iterations, {total:.1f} s). "
     last = Text(found, "green" if solution.success and report.ok else "yellow")
@@ -140,7 +144,7 @@ def answer(
         return last
     verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
     above = [*_ladder_lines(solution), *_estimate(solution), Text(), *_legs(solution)]
-    return Group(*above, *verdicts, *_file_lines(written), last)
+    return Group(*above, *verdicts, *more, *_file_lines(written), last)
 
 
 def failure(solution: Solution, quiet: bool = False, written: Sequence[Path] = ()) -> RenderableType:

@@ -25,8 +25,7 @@ from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung, answered, cut_short, held_answer, rounded
-from dmoc.solver.tube import in_tube, out_of_tube
+from dmoc.solver.rung import Rung, answered, cut_short, held_answer, in_tube, out_of_tube, rounded
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000

@@ -94,13 +94,13 @@ def on_shorter_steps(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any
 def _grazed(ladder: Ladder, rung: Rung) -> tuple[Rung, bool]:
     """The answer with the steps that cut a zone in two; whether that makes it clear at about the same cost."""
     for _ in range(MOST_FINER):
-        path, before = rung.path, _cost(rung)
+        path, before = rung.path, rung.cost
         mesh = _shortened(path.mesh, _steps(_cuts(ladder, rung)))
         finer = ladder.refine_on(path.onto(mesh, path.order, path.hold))
         if not finer.solved:
             return finer if finer.stopped else rung, False
         rung = finer
-        if abs(_cost(rung) - before) > ANOTHER * abs(before):
+        if abs(rung.cost - before) > ANOTHER * abs(before):
             return rung, False
         if not _cuts(ladder, rung):
             return rung, True
@@ -109,12 +109,12 @@ def _grazed(ladder: Ladder, rung: Rung) -> tuple[Rung, bool]:
 
 def _distinct(answers: list[Rung]) -> list[Rung]:
     """Those that were solved and differ in what they cost, the cheapest first."""
-    solved = sorted((one for one in answers if one.solved), key=_cost)
+    solved = sorted((one for one in answers if one.solved), key=lambda one: one.cost)
     last, found = np.inf, []
     for one in solved:
-        if not np.isclose(_cost(one), last, rtol=SAME_OBJECTIVE, atol=0.0):
+        if not np.isclose(one.cost, last, rtol=SAME_OBJECTIVE, atol=0.0):
             found.append(one)
-        last = _cost(one)
+        last = one.cost
     return found
 
 
@@ -228,10 +228,6 @@ def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
 def _deepest(ladder: Ladder, rung: Rung) -> float:
     """The deepest cut over the one that is allowed [-]; infinite for what was not solved."""
     return max((cut.value / cut.allowed for cut in _cuts(ladder, rung)), default=0.0) if rung.solved else np.inf
-
-
-def _cost(rung: Rung) -> float:
-    return rung.problem.objective.sense * rung.level.objective
 
 
 def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:

@@ -47,19 +47,21 @@ MOST_SOLVED = 3
 
 
 @dataclass(frozen=True)
-class _Sounding:
+class Sounding:
     """The path of least effort for one duration, and what it promises for the problem itself.
 
     `excess` is by how much its force in the mean square exceeds the limit [N]. As no force moves the body in
     that time with less in the mean square, a transfer cannot be flown if that is above the limit. `cost` is
     about the objective of the problem along the path, with the sign of a minimum. `pinned` says that the
     problem is to be solved with this duration first; where force costs nothing, the duration is all there is.
+    `effort` is that of the path [N^2 s].
     """
 
     path: DiscretePath
     excess: float
     cost: float
-    pinned: bool = True
+    pinned: bool
+    effort: float
 
 
 def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | None:
@@ -79,10 +81,10 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
     best: Rung | None = None
     for one in soundings[:MOST_SOLVED]:
         # Least effort without a limit costs about as much as the answer to the problem, or more.
-        if best is not None and one.cost > _cost(best):
+        if best is not None and one.cost > best.cost:
             break
-        rung = _solved(ladder, one, order, hold)
-        if rung.solved and (best is None or _cost(rung) < _cost(best)):
+        rung = solved_from(ladder, one, order, hold)
+        if rung.solved and (best is None or rung.cost < best.cost):
             best = rung
     if best is not None and best.pinned:
         best = _shortest_alike(ladder, best, [one for one in soundings if one.excess == 0], hold)
@@ -97,18 +99,18 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
     return freed if freed.solved else best
 
 
-def _shortest_alike(ladder: Ladder, best: Rung, soundings: list[_Sounding], hold: bool) -> Rung:
+def _shortest_alike(ladder: Ladder, best: Rung, soundings: list[Sounding], hold: bool) -> Rung:
     """An answer that costs as much as the best one and takes less time, if there is one: it does not coast."""
     for one in sorted(soundings, key=lambda one: -one.path.duration):
         if one.path.duration < best.path.duration:
-            rung = _solved(ladder, one, best.nlp.scheme.order, hold)
-            if not rung.solved or _cost(rung) > _cost(best) + ALIKE * abs(_cost(best)):
+            rung = solved_from(ladder, one, best.nlp.scheme.order, hold)
+            if not rung.solved or rung.cost > best.cost + ALIKE * abs(best.cost):
                 break
             best = rung
     return best
 
 
-def _solved(ladder: Ladder, one: _Sounding, order: int, hold: bool) -> Rung:
+def solved_from(ladder: Ladder, one: Sounding, order: int, hold: bool) -> Rung:
     """The problem itself from the path of least effort of one duration."""
     steps = max(COARSEST_NODES[True] // (order // 2), least_steps(ladder.problem, one.path))
     return _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
@@ -146,17 +148,19 @@ def _durations(problem: TransferProblem) -> list[float]:
     return np.linspace(shortest, longest, count).tolist()
 
 
-def _sounding(ladder: Ladder, duration: float) -> _Sounding | None:
+def _sounding(ladder: Ladder, duration: float) -> Sounding | None:
     """The path of least effort in a duration; None where it was not found in a few iterations."""
-    problem = ladder.problem
-    free = replace(problem, duration=duration, actuator=FreeForce(), objective=Effort())
+    free = replace(ladder.problem, duration=duration, actuator=FreeForce(), objective=Effort())
     first = starting_guess(free, uniform_mesh(SOUNDING_STEPS), ORDER_OF_MANY_TURNS, False)
     steps = int(np.clip(least_steps(free, first), SOUNDING_STEPS, 5 * SOUNDING_STEPS))
     guess = starting_guess(free, uniform_mesh(steps), ORDER_OF_MANY_TURNS, False)
     rung = ladder.ask(free, guess, f"least effort in {lasting(duration, 6)}")
-    if not rung.solved:
-        return None
-    path = replace(rung.path, multipliers={})
+    return promise(ladder.problem, rung) if rung.solved else None
+
+
+def promise(problem: TransferProblem, rung: Rung) -> Sounding:
+    """What a path of least effort promises for the problem itself."""
+    path, effort = replace(rung.path, multipliers={}), rung.level.objective
     weights = node_weights(path.mesh, scheme(path.order))
     needed = float(np.sqrt(weights @ np.square(path.control).sum(axis=1)))
     limit = problem.actuator.force_limit()
@@ -164,13 +168,14 @@ def _sounding(ladder: Ladder, duration: float) -> _Sounding | None:
     control = controls_for(problem, path.control)
     if control is None:
         control = np.zeros((len(path.control), problem.controls))
-        return _Sounding(replace(path, control=control), excess, rung.level.objective)
+        return Sounding(replace(path, control=control), excess, effort, problem.free_duration, effort)
     flown = _with_mass(problem, replace(path, control=control))
     cost = problem.objective.sense * cost_along(problem, flown)
-    pinned = cost_along(problem, replace(path, control=0 * control)) != cost_along(problem, flown)
-    most = np.abs(path.control).max() if limit is None else limit
-    within = control * min(1.0, most / np.linalg.norm(path.control, axis=1).max(initial=most))
-    return _Sounding(replace(path, control=within), excess, cost, pinned)
+    paid = cost_along(problem, replace(path, control=0 * control)) != cost_along(problem, flown)
+    pinned = problem.free_duration and paid
+    most = np.inf if limit is None else limit
+    within = control * min(1.0, most / np.linalg.norm(path.control, axis=1).max(initial=0.0))
+    return Sounding(replace(path, control=within), excess, cost, pinned, effort)
 
 
 def _with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
@@ -181,7 +186,3 @@ def _with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
     flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
     burnt = path.duration * np.cumsum(node_weights(path.mesh, scheme(path.order)) * flow)
     return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))
-
-
-def _cost(rung: Rung) -> float:
-    return rung.problem.objective.sense * rung.level.objective

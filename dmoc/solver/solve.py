@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
@@ -18,6 +19,8 @@ from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zon
 from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
+from dmoc.solver.rung import Rung
+from dmoc.solver.second_look import cheaper_revolutions
 from dmoc.solver.starts import compared
 from dmoc.solver.tolerance import climb_to_tolerance
 
@@ -91,10 +94,18 @@ def _solved(
     is_open = steps is None and mesh is None
     if is_open and best is None:
         rung, first = on_shorter_steps(ladder, rung, first, given)
-    rung = past_zones(ladder, rung, first, given, is_open)
-    if is_open:
-        rung = onto_goal(ladder, rung, first, given, order, pinned)
-        rung = onto_price(ladder, rung, pinned)
+
+    def mended(rung: Rung) -> Rung:
+        rung = past_zones(ladder, rung, first, given, is_open)
+        if is_open:
+            rung = onto_goal(ladder, rung, first, given, order, pinned)
+            rung = onto_price(ladder, rung, pinned)
+        return rung
+
+    rung = mended(rung)
+    if guess is None and mesh is None:
+        other = cheaper_revolutions(ladder, rung, partial(first_path, problem, order, steps, hold))
+        rung = mended(other) if other.number > rung.number else other
     return ladder.solution(rung)
 
 

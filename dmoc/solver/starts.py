@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.basics.quaternions import times, turned_by
 from dmoc.guess.coast import VERY_MANY_TURNS
-from dmoc.guess.open_ends import windings_between
+from dmoc.guess.open_ends import OTHER_TURNS, with_more_turns
 from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.motion.path import DiscretePath
@@ -160,13 +160,8 @@ def _variants(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[st
             yield name, replace(base, position=position)
     lone = problem.attraction.lone
     if lone is not None and problem.dimension > 1:
-        center = lone.place(problem.dimension)
-        ends = [(base.position[i], v) for i, v in ((0, base.start_velocity), (-1, base.goal_velocity))]
-        for turns in (1, -1, 2, -2):
-            windings = windings_between(problem, base.duration, ends, turns)
-            turned = center + turned_around(base.position - center, turns * base.fractions)
-            position = windings[0][0](base.fractions) if windings else turned
-            yield f"{turns:+d} revolutions", replace(base, position=position)
+        for turns in OTHER_TURNS:
+            yield f"{turns:+d} revolutions", with_more_turns(problem, base, turns)
     if not linked:
         yield from ways_past(problem, base)
     # The seed is fixed: a second run must find the same optima.
@@ -200,15 +195,3 @@ def _turns(problem: TransferProblem, base: DiscretePath) -> Iterator[tuple[str, 
         for at in path.coordinates.quaternions:
             position[:, at] = times(position[:, at], turned_by(waves @ draw.normal(size=(2, 3))))
         yield f"bend {number}" + (f" of {name}" if name else ""), replace(path, position=position)
-
-
-def turned_around(offset: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Positions around the origin, each turned by its number of `turns` in the plane of the motion."""
-    padded = np.pad(offset, ((0, 0), (0, 3 - offset.shape[1])))
-    normal = np.cross(padded[:-1], padded[1:]).sum(axis=0)
-    normal = normal / (np.linalg.norm(normal) or 1.0)
-    angle = 2 * np.pi * turns[:, None]
-    # Rodrigues' formula
-    along = normal * (padded @ normal)[:, None]
-    turned = np.cos(angle) * padded + np.sin(angle) * np.cross(normal, padded) + (1 - np.cos(angle)) * along
-    return turned[:, : offset.shape[1]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,8 @@ from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import OFF_OPTIMUM, Rung, let_go
+from dmoc.solver.rung import OFF_OPTIMUM, Rung, at_rest
+from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
@@ -80,19 +82,22 @@ def climb_to_tolerance(
     trial = flat_optimum(ladder, first)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
+    if guess is None:
+        trial = cheaper_revolutions(
+            ladder, trial, partial(trial_path, ladder.problem, first.order, steps, hold)
+        )
     trial = past_zones(ladder, trial, first, guess, refined=True)
     if not trial.solved:
         return ladder.solution(trial, tolerance=tol)
     path = trial.path
     order, reason = (order, "the order as given") if order else _best_order(ladder.problem, trial, tol)
     reason = "; ".join([*trial.notes, reason])
-    begun = trial
     if order != path.order:
-        begun = ladder.solve_on(path.onto(with_as_many_nodes(path, order), order, hold))
-        if not begun.solved:
-            return ladder.solution(begun, tolerance=tol)
+        trial = ladder.solve_on(path.onto(with_as_many_nodes(path, order), order, hold))
+        if not trial.solved:
+            return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
-    return _Refinement(ladder, tol, local, reason).of(begun, order, hold)
+    return _Refinement(ladder, tol, local, reason).of(trial, order, hold)
 
 
 @dataclass(frozen=True)
@@ -112,10 +117,8 @@ class _Refinement:
         self.changes: list[tuple[float, float]] = []
         self.errors: dict[int, float] = {}
         self.best: _Found | None = None
-        self.worse = 0
-        self.rounded = 0.0
-        self.flat = False
-        self.lean, self.linear = 0.0, has_linear_controls(ladder.problem)
+        self.rounded, self.flat, self.lean, self.worse = 0.0, False, 0.0, 0
+        self.linear = has_linear_controls(ladder.problem)
 
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
@@ -130,6 +133,8 @@ class _Refinement:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
+            if not self.changes and rung.pull > OFF_OPTIMUM:
+                rung = at_rest(self.ladder.try_on, rung, self.lean)
             fine = rung.path
             self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
             self._hold_if_flat(rung)
@@ -201,19 +206,15 @@ class _Refinement:
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        begun, found = rung, let_go(self.ladder.try_on, rung, self.lean)
-        cost, sense = begun.level.objective, self.problem.objective.sense
-        # Another optimum that costs a hundredth more is no better answer.
-        if found is None or found.stopped or sense * (found.level.objective - cost) > 0.01 * abs(cost):
-            return begun
-        rung = found
-        before, after = ((one.path, one.level.objective) for one in (begun, rung))
-        moved = change(self.problem, before, after, np.ones(len(rung.nlp.mesh) - 1, int))
+        if (found := at_rest(self.ladder.try_on, rung, self.lean)) is rung:
+            return rung
+        before, after = ((one.path, one.level.objective) for one in (rung, found))
+        moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))
         if moved[1] > SAME_COST * self.tol:
             self.changes[-1] = (self.changes[-1][0] + moved[0], self.changes[-1][1] + moved[1])
         elif moved[0] > self.tol:
             self.reason += f"; paths that differ by {moved[0]:.1g} of the extent cost the same"
-        return rung
+        return found
 
     def _sharpen(self, rung: Rung, most: float) -> None:
         """Where the rounding of |F| alone costs more than the tolerance, round it less on the same mesh."""

@@ -198,7 +198,11 @@ def solve(
 
 def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
     """Whether structure is tried without being asked for."""
-    if hold or chosen != (None, None, None) or not (isinstance(tol, float) and 0 < tol < TIGHT):
+    if (
+        hold is not False
+        or any(part is not None for part in chosen)
+        or not (isinstance(tol, float) and 0 < tol < TIGHT)
+    ):
         return False
     from dmoc.structure.solve import has_switches
 

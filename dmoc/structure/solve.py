@@ -28,7 +28,7 @@ from dmoc.structure.solution import structured
 # |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer.
 ROUNDED = 1e-3
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
-COARSE_STEPS = {2: 60, 4: 40}
+COARSE_STEPS = {2: 60, 4: 30}
 # Over more revolutions than this there are too many arcs.
 MOST_TURNS = 10
 # Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.guess.open_ends import turned_around
 from dmoc.legs.legs import Leg
 from dmoc.missions.climb import OTHER_DURATIONS, Climb, first_path
 from dmoc.missions.guess import likely_durations
 from dmoc.missions.path import MissionPath
 from dmoc.scene.mission import Mission
-from dmoc.solver.starts import SAME_OBJECTIVE, Optimum, turned_around
+from dmoc.solver.starts import SAME_OBJECTIVE, Optimum
 
 # Two answers are one optimum only if their legs last as long but for this part of the mission's duration [-].
 SAME_TIMES = 1e-2

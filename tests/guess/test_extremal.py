@@ -45,6 +45,15 @@ def test_the_path_meets_the_equations_of_motion_and_the_goal():
     assert abs(position[-1] @ velocity[-1]) < 2e-6 * speed * (EARTH + 750e3)
 
 
+def test_around_an_oblate_body_the_effort_is_not_twice_the_least():
+    """A search from a coast of the oblate body itself ends on a path of 18,180 N^2 s, stationary as well."""
+    problem = CASE["problem"](days=10.0, climb=500e3)
+    extremal, costate = found(problem)
+    force = extremal.along(costate, np.linspace(0, 1, 4001))[2]
+    effort = 0.5 * problem.duration * np.mean((force**2).sum(axis=1))
+    assert effort == pytest.approx(edelbaum(problem, 500e3), rel=0.01)
+
+
 def test_the_force_keeps_its_limit():
     problem = CASE["problem"](days=1.0, limit=0.19)
     free = found(CASE["problem"](days=1.0))

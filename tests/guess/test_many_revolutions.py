@@ -14,8 +14,8 @@ from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import find, load_problem
 from dmoc.solver.meshes import coarse_to_fine, first_path
+from dmoc.solver.rung import in_tube
 from dmoc.solver.starts import local_optima
-from dmoc.solver.tube import in_tube
 
 GEO = runpy.run_path(str(find("geo_raise")))
 PLANE = math.radians(28.5)
@@ -116,7 +116,8 @@ def test_whatever_the_phase_the_default_guess_is_next_to_a_good_optimum(duration
     }
     found = solve(load_problem("orbit_raise").make(duration=duration), order=8, steps=32).raise_for_status()
     assert found.objective == pytest.approx(seen[duration], rel=1e-3)
-    assert found.iterations < 25
+    # A second look at other revolutions, where the phase takes most of the effort, does not count.
+    assert sum(level.iterations for level in found.ladder if not level.question) < 25
 
 
 def test_coarse_meshes_follow_the_revolutions():

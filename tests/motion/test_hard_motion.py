@@ -155,7 +155,6 @@ def test_a_cost_several_times_off_is_said_so():
     assert found.objective < 2 * FLYBY or not verify(found).ok
 
 
-@pytest.mark.slow
 def test_a_tolerance_finds_the_mesh_of_a_flyby():
     found = solve(flyby(), tol=1e-3)
     assert found.success and verify(found).ok

@@ -427,6 +427,7 @@ def test_every_constructor_is_tried():
     results = {
         "Body",
         "Check",
+        "Dispersion",
         "Evidence",
         "Formulation",
         "MissionSolution",
@@ -436,7 +437,9 @@ def test_every_constructor_is_tried():
         "Solution",
         "SolveError",
         "TeamSolution",
+        "Symmetry",
         "Trajectory",
+        "Worth",
     }
     assert made - abstract - without_arguments - results == set(MAKES)
 
@@ -465,11 +468,16 @@ def test_constructors_and_any_value(name, data):
 
 # Solutions of 4 steps are quick, whatever else is asked for.
 CALLS = {
+    "disperse": (
+        dmoc.disperse,
+        {"start": (0.1, 0.1), "force": 0.1, "pointing": 0.0, "mass": 0.1, "samples": 3, "seed": 1},
+    ),
     "drift": (
         dmoc.drift,
         {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
     ),
     "load": (dmoc.load, {"path": "nothing.nc"}),
+    "predict": (dmoc.predict, {"mass": 2.0, "goal_position": (1.0, 1.0)}),
     "save_figure": (save_figure, {"path": "x.svg"}),
     "simulate": (
         simulate,
@@ -499,6 +507,8 @@ CALLS = {
     "solve to a tolerance": (solve, {"problem": HERE, "tol": 1e-2, "order": 4, "steps": 4}),
     "transcribe": (transcribe, {"problem": HERE, "steps": 4, "order": 2, "mesh": None, "guess": None}),
     "verify": (verify, {"problem": HERE}),
+    "symmetries": (dmoc.symmetries, {}),
+    "worth": (dmoc.worth, {}),
 }
 # None means "not given"; what such a function raises in the middle of a solve is what solve raises
 LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
@@ -508,7 +518,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("verify", "save_figure"):
+    if name in ("verify", "save_figure", "symmetries", "worth", "predict", "disperse"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:
@@ -527,6 +537,7 @@ VERBS = {
     ),
     "show": (["point_to_point"], ["--set"]),
     "simulate": (["point_to_point", *STEPS], ["--order", "--steps", "--set", "--controls"]),
+    "disperse": (["nothing.nc"], ["--start", "--force", "--pointing", "--samples", "--seed", "--plot"]),
     "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
     "check": (["nothing.nc"], ["--problem"]),
     "plot": (["nothing.nc"], ["--out", "--problem"]),

@@ -267,6 +267,12 @@ def test_without_switches_a_tight_tolerance_is_the_ladder():
     assert not hasattr(dmoc.solve(problem, tol=1e-8), "legs")
 
 
+def test_steps_where_functions_are_not_finite_are_not_told(capfd):
+    """On 30 steps Ipopt tries steps on which masses become negative."""
+    dmoc.solve(gallery("goddard"), 2, 30, options={"ipopt.max_iter": 150})
+    assert capfd.readouterr() == ("", "")
+
+
 def test_what_structure_does_not_take_is_refused():
     with pytest.raises(ValueError, match="give neither hold nor mesh"):
         dmoc.solve(gallery("two_body_fuel"), hold=True, structure=True)
