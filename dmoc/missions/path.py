@@ -48,7 +48,15 @@ class MissionPath:
         """Whether its legs and joints have the unknowns of this mission."""
         sizes = [(leg.position.shape[1], leg.control.shape[1]) for leg in self.legs]
         wanted = [(leg.size, leg.controls) for leg in mission.stretches]
-        return sizes == wanted and set(self.own) == {joint.name for joint in mission.joints if joint.events}
+        own = {name for name, values in self.own.items() if len(values)}
+        axes = mission.dimension
+        # At the start the velocity before its events is an unknown, too.
+        named = {
+            joint.name
+            for joint in mission.joints
+            if any(event.unknowns(axes) or joint.left is None for event in joint.events)
+        }
+        return sizes == wanted and own == named
 
     def as_arrays(self) -> tuple[np.ndarray, np.ndarray]:
         """Times [s] and positions of the nodes of all legs; where legs meet the later one counts."""

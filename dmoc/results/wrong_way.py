@@ -35,7 +35,10 @@ STUCK = (
 
 def in_two_pieces(problem: TransferProblem) -> bool:
     """Whether the forces of an actuator are two separate pieces of a line."""
-    return problem.dimension == 1 and getattr(problem.actuator, "min_thrust", 0.0) > 0.0
+    one = problem.actuator
+    # A body that turns, or has links, may have other controls by these names.
+    line = problem.dimension == 1 and problem.controls == 2 and one.labels(1) == ("x", "throttle")
+    return line and bool(one.bounds(1)[0][1] > 0.0)
 
 
 def wrong_way(leg: Solution) -> tuple[np.ndarray, float]:

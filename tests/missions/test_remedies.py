@@ -97,6 +97,8 @@ def test_what_can_never_be_flown_is_refused_when_the_mission_is_made(change, tol
 def test_a_duration_is_checked_by_its_leg_and_may_be_any_kind_of_number():
     with pytest.raises(ValueError, match=re.escape("Leg: duration must be greater than 0 [s]; got -1")):
         Leg(-1)
+    with pytest.raises(ValueError, match="its shortest must be less than its longest"):
+        Leg((2.0, 1.0))
     assert Leg(Decimal("1.5")).duration == 1.5
     assert Leg(np.array([1, 2])).duration == (1.0, 2.0)
     with pytest.raises(ValueError, match="Coast: there is no actuator in a coast"):
