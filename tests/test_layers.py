@@ -30,9 +30,10 @@ LAYERS = [
     ["teams"],
     ["structure"],
     ["planners"],
-    ["studies", "sweeps", "exports", "sensitivity"],
+    ["studies", "sweeps", "exports", "answers", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
+    ["notebook"],
     ["cli"],
 ]
 FLOOR = {folder: floor for floor, folders in enumerate(LAYERS) for folder in folders}

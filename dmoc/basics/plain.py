@@ -1,9 +1,12 @@
-"""Values made plain: text on one line, numbers that JSON can hold."""
+"""Values made plain: text on one line, numbers that JSON can hold, objects in one line."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
+
+# What takes more letters than this is told by its type.
+LONGEST = 40
 
 
 def unbroken(text: Any) -> str:
@@ -21,3 +24,24 @@ def finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+class Brief:
+    """A dataclass that shows itself in one line: of arrays their shapes, of long parts their types."""
+
+    def __init_subclass__(cls) -> None:
+        # A dataclass would otherwise write one of its own, which prints every array.
+        cls.__repr__ = Brief.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        """Such as Trajectory(time 401, position 401 x 2, mass 401)."""
+        parts = [f"{name} {_brief(value)}" for name, value in vars(self).items() if value is not None]
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+
+def _brief(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple) and shape:
+        return " x ".join(map(str, shape))
+    told = f"{value:g}" if isinstance(value, float) else repr(value)
+    return told if len(told) <= LONGEST else type(value).__name__

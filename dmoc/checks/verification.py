@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -16,6 +15,8 @@ from dmoc.checks.balances import amplification, balance, energy_gap, misses
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
+from dmoc.checks.report import Check as Check
+from dmoc.checks.report import Report as Report
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
@@ -39,39 +40,6 @@ CONSTRAINT = 1e-10
 TURN_MOST = np.radians(90)
 # The first-order conditions may be off by this part of the objective or the force [-].
 OPTIMALITY = 1e-5
-
-
-@dataclass(frozen=True)
-class Check:
-    """One verdict. `value` and `limit` are None where the check does not apply; `note` says why."""
-
-    name: str
-    value: float | None
-    limit: float | None
-    unit: str
-    ok: bool
-    note: str = ""
-
-    @classmethod
-    def of(cls, name: str, value: float, limit: float, unit: str, note: str = "") -> Check:
-        """A verdict that holds up to the limit; a value which is not a number never passes."""
-        return cls(name, float(value), float(limit), unit, bool(value <= limit), note)
-
-
-@dataclass(frozen=True)
-class Report:
-    """The checks of one solution: those of `verify`, then those of the user's own."""
-
-    checks: tuple[Check, ...]
-    seconds: float
-
-    @property
-    def ok(self) -> bool:
-        """Whether every check holds."""
-        return all(check.ok for check in self.checks)
-
-    def __getitem__(self, name: str) -> Check:
-        return next(check for check in self.checks if check.name == name)
 
 
 def verify(

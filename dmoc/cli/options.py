@@ -153,42 +153,25 @@ def watched(quiet: bool, unit: str) -> AbstractContextManager[Callable | None]:
 
 
 def attached(path: Path, source: str | None) -> Solution:
-    """A saved solution with its problem: the one given, else the one it names.
-
-    The name in a file is only ever looked up in the problem folders, or taken for the very file of this name in
-    the working folder that it was made from: a file must not choose what is run.
-    """
+    """A saved solution with its problem: the one given, else the one it names (`dmoc.scene.named`)."""
     import dmoc
+    from dmoc.scene.named import attached_from, named
     from dmoc.scene.problem_file import load_problem
 
     solution = dmoc.load(path)
     known = solution.provenance
-    source = source or _named(known.problem_name, known.source_hash)
+    source = source or named(known.problem_name, known.source_hash)
     if source is None:
         raise ValueError(
             f"{path} was made from {known.problem_name!r}, of which there is no problem file; "
             "give it with --problem PATH"
         )
     file = load_problem(source)
-    made = file.make(**known.parameters)
-    attached = solution.attach(getattr(made, "alone", None) or made)
+    found = attached_from(file, solution)
     # a solution that was saved from Python has no hash: there may have been no problem file
     if known.source_hash and known.source_hash != file.source_hash:
         warn(f"{file.path} is no longer, or never was, the file that {path} was made from")
-    return attached
-
-
-def _named(name: str, source_hash: str) -> str | None:
-    """What a saved solution names: the file with its hash in the working folder, else one of the folders'."""
-    import hashlib
-
-    from dmoc.scene.problem_file import has_problem
-
-    here = Path(f"{name}.py")
-    known = bool(source_hash) and here.name == f"{name}.py" and here.is_file()
-    if known and hashlib.sha256(here.read_bytes()).hexdigest() == source_hash:
-        return str(here)
-    return name if name.isidentifier() and has_problem(name) else None
+    return found
 
 
 def seen(file: Path, source: str | None) -> Any:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.basics.plain import Brief
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -23,7 +24,7 @@ PIECE = 4096
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class Trajectory(Brief):
     """A path found by forward integration, at the step ends; SI units, one row an end.
 
     Attributes
@@ -146,8 +147,7 @@ def _path_at_start(
         problem.duration_bounds[1] if duration is None else number("duration", duration, "s", positive=True)
     )
     position, velocity = problem.start.fixed()
-    mass = np.full(nodes, problem.mass)
-    still = np.tile(position, (nodes, 1))
+    mass, still = np.full(nodes, problem.mass), np.tile(position, (nodes, 1))
     made = configuration_of(problem).coordinates
     return DiscretePath(mesh, order, hold, longest, still, given, mass, velocity, velocity, made_of=made)
 

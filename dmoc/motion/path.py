@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.basics.arguments import LARGEST, number
 from dmoc.basics.numerics import cubic_spline
+from dmoc.basics.plain import Brief
 from dmoc.basics.quaternions import angle_between, normalised, times
 from dmoc.configurations.coordinates import ATTITUDE, Coordinates
 from dmoc.motion.lobatto import Scheme, scheme
@@ -48,7 +49,7 @@ POSITION_BOUNDS = Key("node", "column", "position")
 
 
 @dataclass(frozen=True)
-class DiscretePath:
+class DiscretePath(Brief):
     """A path on a mesh, good enough to start from: SI units, one row a node.
 
     Attributes

@@ -41,6 +41,10 @@ class NLP(Program):
     it, without a rebuild.
     """
 
+    def __repr__(self) -> str:
+        sizes = f"{self.columns.size} unknowns, {self.rows.size} rows"
+        return f"NLP of {self.problem.name!r}: order {self.scheme.order}, {len(self.mesh) - 1} steps, {sizes}"
+
     def solver(
         self,
         options: dict[str, Any] | None = None,

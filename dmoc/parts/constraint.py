@@ -36,6 +36,7 @@ class Constraint(ABC):
     6. `outline`: its shape in a picture; without one, a picture in the plane shows where `excess` is positive.
     7. `ways_round` and `off_centre`: how a starting path gets past it.
     8. `feature`: the size of the smallest thing that a path must not step over.
+    9. `clearance`: how far a place is from breaking it, which `facts` of an answer tell.
 
     Not its business: meshes, units, scaling and multipliers. `q`, `v` are CasADi columns of the problem's
     dimension, `u` the controls of the node or None where they are held, and fields named in `adjustable`,
@@ -175,6 +176,10 @@ class Constraint(ABC):
     def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The same at times of shape (count,), for a limit that moves; `excess` by default."""
         return self.excess(q, v)
+
+    def clearance(self, t: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+        """How far places are from where the limit is broken [m], negative behind it; None if that is no way."""
+        return None
 
     @abstractmethod
     def words(self) -> str:

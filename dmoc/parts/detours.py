@@ -67,6 +67,9 @@ class KeepOut(Constraint):
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, self.radius - np.linalg.norm(q - np.asarray(self.center), axis=1))
 
+    def clearance(self, t: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(q - np.asarray(self.center), axis=1) - self.radius
+
     def words(self) -> str:
         center = f"({', '.join(f'{x:g}' for x in self.center)})"
         return f"stays {self.radius:g} m away from {center} m{self.of_point}"

@@ -85,6 +85,9 @@ class KeepIn(Constraint):
     def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, np.maximum(self.lower - q, q - self.upper)).max(axis=1)
 
+    def clearance(self, t: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return np.minimum(q - self.lower, np.asarray(self.upper) - q).min(axis=1)
+
     def eased(self, slack: float) -> KeepIn:
         return replace(self, lower=np.subtract(self.lower, slack), upper=np.add(self.upper, slack))
 
@@ -204,15 +207,17 @@ class ApproachCone(Constraint):
         return self.excess_at(np.zeros(len(q)), q, v)
 
     def excess_at(self, t: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        # Rounded, the cone is wider by so much, which is no fault of the path.
+        wider = self.rounding / np.tan(self.half_angle) if q.shape[1] == 3 else 0.0
+        return np.maximum(0.0, -self.clearance(t, q) - wider)
+
+    def clearance(self, t: np.ndarray, q: np.ndarray) -> np.ndarray:
         offset, axis = self._offset_at(t, q)
         depth = np.sum(offset * axis, axis=1)
         aside = np.linalg.norm(offset - depth[:, None] * axis, axis=1)
-        # The distance from the surface is |d| sin(angle beyond it); behind the tip it is |d| itself.
+        # The distance from the surface is |d| sin(angle from it); where no foot of it is nearer, |d| itself.
         beyond = np.arctan2(aside, depth) - self.half_angle
-        outside = np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, 0.0, np.pi / 2))
-        # Rounded, the cone is wider by so much, which is no fault of the path.
-        wider = self.rounding / np.tan(self.half_angle) if q.shape[1] == 3 else 0.0
-        return np.maximum(0.0, outside - wider)
+        return -np.linalg.norm(offset, axis=1) * np.sin(np.clip(beyond, -np.pi / 2, np.pi / 2))
 
     def _offset_at(self, t: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places from the tip, and the unit axis, at times."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.digits import TIMES
+from dmoc.basics.digits import UNITS
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
@@ -70,18 +70,6 @@ SETTINGS: Any = {
     "axes.formatter.limits": (-3, 5),
 }
 
-# Values given in an SI unit are drawn in another one from this least value on: (least value, size of that unit,
-# its name), the largest first.
-_UNITS = {
-    "s": TIMES,
-    "m": ((1e4, 1e3, "km"),),
-    "m/s": ((1e4, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
-    "N": ((1e7, 1e6, "MN"), (1e4, 1e3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e-3, "mN")),
-    "J": ((1e10, 1e9, "GJ"), (1e7, 1e6, "MJ"), (1e4, 1e3, "kJ"), (1e-2, 1.0, "J"), (0.0, 1e-3, "mJ")),
-    "J/kg": ((1e7, 1e6, "MJ/kg"), (1e4, 1e3, "kJ/kg")),
-}
-
-
 # A curve has about this many points in all ...
 POINTS = 600
 # ... and no more than this many in one step.
@@ -93,7 +81,7 @@ LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1
 def readable(values: Any, unit: str) -> tuple[float, str]:
     """(size of the unit to draw in, its name) for values given in SI."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    choices = _UNITS.get(unit, ()) if largest else ()
+    choices = UNITS.get(unit, ()) if largest else ()
     return next(((size, name) for least, size, name in choices if largest >= least), (1.0, unit))
 
 

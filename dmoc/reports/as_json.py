@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from dmoc.answers.facts import facts_of
 from dmoc.basics.plain import finite
 from dmoc.reports.verdict import accuracy
 
@@ -48,6 +50,7 @@ def solve_object(solution: Solution, report: Report | None) -> dict[str, Any]:
             }
             for check in listed
         },
+        "facts": _facts(solution) if report and math.isfinite(solution.objective) else {},
         **(_of_mission(solution) if hasattr(solution, "impulses") else {}),
         **(_of_team(solution) if hasattr(solution, "members") else {}),
     }
@@ -83,6 +86,11 @@ def _of_mission(solution: Any) -> dict[str, Any]:
         ],
         "primer": {"time": [float(t) for t in times], "length": [float(size) for size in sizes]},
     }
+
+
+def _facts(solution: Any) -> dict[str, Any]:
+    """What users ask of an answer, in SI units."""
+    return {name: {"value": fact.value, "unit": fact.unit} for name, fact in facts_of(solution).items()}
 
 
 def _of_team(solution: Any) -> dict[str, Any]:

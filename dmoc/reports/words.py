@@ -142,7 +142,7 @@ def answer(
         last.append(f" Note that {warning}.", "yellow")
     if quiet:
         return last
-    verdicts = Text("Checks of the answer", "bold"), checks(report), Text()
+    verdicts = Text("Checks of the answer", "bold"), checks(report), Text(), *_facts(solution)
     above = [*_ladder_lines(solution), *_estimate(solution), Text(), *_legs(solution)]
     return Group(*above, *verdicts, *more, *_file_lines(written), last)
 
@@ -230,6 +230,15 @@ def _legs(solution: Any) -> list[RenderableType]:
     if not hasattr(solution, "impulses"):
         return []
     return [legs_table(solution), Text()]
+
+
+def _facts(solution: Solution) -> list[RenderableType]:
+    """What users ask of an answer, in few lines."""
+    # It asks the scene, and so loads CasADi, which `dmoc --help` does without.
+    from dmoc.answers.facts import facts_of
+
+    lines = facts_of(solution).lines()
+    return [Text("The answer in numbers", "bold"), pairs(lines), Text()] if lines else []
 
 
 def _ladder_lines(solution: Solution) -> list[RenderableType]:

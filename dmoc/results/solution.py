@@ -4,70 +4,20 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.motion.path import COSTATE, DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.moments import Moment, moment, named_body
+from dmoc.results.outcome import NOT_MET as NOT_MET
+from dmoc.results.outcome import OUT_OF_TIME as OUT_OF_TIME
+from dmoc.results.outcome import Outcome as Outcome
+from dmoc.results.outcome import SolveError as SolveError
 from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
-
-# Status of a local optimum that is not as accurate as it was asked to be.
-NOT_MET = "tolerance not met"
-# Status of a local optimum on a mesh before the last one, when the time was over.
-OUT_OF_TIME = "time limit"
-
-
-class SolveError(RuntimeError):
-    """Raised by `Solution.raise_for_status` when the optimisation failed."""
-
-
-class Outcome:
-    """What the solutions of transfers and of missions have in common: how the solve ended, and its effort."""
-
-    success: bool
-    status: str
-    message: str
-    ladder: tuple[Level, ...]
-
-    @property
-    def optimal(self) -> bool:
-        """Whether the path is a local optimum, be it as accurate as asked for or not."""
-        return self.success or self.status in (NOT_MET, OUT_OF_TIME)
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of Ipopt on all meshes."""
-        return sum(level.iterations for level in self.ladder)
-
-    @property
-    def evaluations(self) -> int:
-        """Evaluations of functions and derivatives on all meshes."""
-        return sum(level.evaluations for level in self.ladder)
-
-    @property
-    def build_s(self) -> float:
-        """Seconds spent on building NLPs."""
-        return sum(level.build_s for level in self.ladder)
-
-    @property
-    def solve_s(self) -> float:
-        """Seconds spent in Ipopt."""
-        return sum(level.solve_s for level in self.ladder)
-
-    def raise_for_status(self) -> Self:
-        """Itself if the solve succeeded.
-
-        Raises
-        ------
-        SolveError
-            With what failed and what to try.
-        """
-        if not self.success:
-            raise SolveError(f"{self.status}: {self.message}")
-        return self
 
 
 @dataclass(frozen=True)
@@ -161,11 +111,33 @@ class Solution(Outcome):
             If no body has this name.
         """
         made = self.path.coordinates
-        names = list(dict.fromkeys(block.body for block in made.blocks))
-        if body not in names:
-            raise ValueError(f"no body is called {body!r}; there are {', '.join(map(repr, names))}")
-        places, speeds = made.of_body(body)
+        places, speeds = named_body(made, body)
         return self.path.position[:, places & made.places], self.velocity[:, speeds[made.speeds]]
+
+    def at(self, t: Any) -> Moment:
+        """State, force and mass at any time, as what is flown between the nodes has them.
+
+        Inside a step positions and velocities are those of the polynomial of degree order/2 + 2 that has the
+        positions of its nodes and the velocities at both of its ends, at order 2 a cubic: as exact as the nodes
+        are. The force is the control that is flown, which jumps to the value behind a switch; without the
+        problem, after `load`, it is the polynomial through the nodes, whatever limits there are.
+
+        Parameters
+        ----------
+        t : float or array
+            Times [s] between the start and the goal.
+
+        Returns
+        -------
+        Moment
+            Its arrays begin with the shape of t.
+
+        Raises
+        ------
+        ValueError
+            If a time lies before the start or behind the goal.
+        """
+        return moment(self, t)
 
     @property
     def reaction(self) -> np.ndarray | None:

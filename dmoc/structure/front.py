@@ -14,6 +14,7 @@ from dmoc.nlp.solving import Progress
 from dmoc.results import solution as transfers
 from dmoc.results.netcdf import format_of
 from dmoc.results.solution import Solution
+from dmoc.scene.named import attached_as_named
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver import solve as transfer_solver
 
@@ -227,6 +228,8 @@ def verify(
     problem: TransferProblem | Mission | Team | None = None,
     more: Sequence[Callable] = (),
 ) -> Report:
+    if problem is None and getattr(solution, "problem", solution) is None:
+        solution = attached_as_named(solution)
     if hasattr(solution, "members"):
         from dmoc.teams.checks import verify_team
 
@@ -238,7 +241,11 @@ def verify(
     return verify_mission(solution, problem, more)  # type: ignore[arg-type]
 
 
-verify.__doc__ = verification.verify.__doc__
+verify.__doc__ = (verification.verify.__doc__ or "").replace(
+    "if it is not the solution's own.",
+    "if it is not the solution's own. One that was loaded finds the problem file that it names, as long as\n"
+    "        that is, to the last letter, the one it was made from.",
+)
 
 
 def load(path: str | os.PathLike) -> Any:

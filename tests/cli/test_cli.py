@@ -15,7 +15,7 @@ from dmoc.scene.problem_file import load_problem
 
 FIGURES = ("objective", "duration", "final_mass", "order", "steps", "nodes", "iterations")
 WORDS = ("problem", "success", "status", "message", "worst", "warnings")
-KEYS = [*WORDS, *FIGURES, "build_s", "solve_s", "verify_s", "accuracy", "checks"]
+KEYS = [*WORDS, *FIGURES, "build_s", "solve_s", "verify_s", "accuracy", "checks", "facts"]
 
 PUSH = """
     \"\"\"A push.\"\"\"
@@ -93,6 +93,24 @@ def test_json_is_one_object_with_the_promised_keys(run):
     )
     for check in found["checks"].values():
         assert set(check) == {"value", "limit", "unit", "ok"} and check["ok"] is True
+
+
+def test_an_answer_is_told_in_numbers(run):
+    code, out, _ = run("solve", "orbit_raise", "--order", "4", "--steps", "40")
+    told = out[out.index("The answer in numbers") :].splitlines()
+    assert (
+        code == 0 and told[1].startswith("velocity change     0.1871 m/s") and told[7].startswith("Solved, a ")
+    )
+    assert [line.split("  ")[0] for line in told[2:6]] == [
+        "peak",
+        "closest approach",
+        "orbit at the start",
+        "orbit at the goal",
+    ]
+    code, out, _ = run("solve", "orbit_raise", "--order", "4", "--steps", "40", "--json")
+    facts = json.loads(out)["facts"]
+    assert facts["velocity change"] == {"value": pytest.approx(0.1871, rel=1e-3), "unit": "m/s"}
+    assert facts["goal a"] == {"value": pytest.approx(1.5), "unit": "m"}
 
 
 def test_json_stays_pure_when_the_problem_file_prints(run, folder):

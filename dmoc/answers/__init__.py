@@ -1,0 +1,1 @@
+"""WHAT USERS ASK OF AN ANSWER."""

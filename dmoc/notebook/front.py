@@ -1,0 +1,33 @@
+"""How an answer shows itself: what the methods of an answer look up here, by these names."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from dmoc.answers.facts import Facts, facts_of
+from dmoc.films.film import animate as animate
+from dmoc.notebook.page import page
+from dmoc.notebook.table import node_table
+from dmoc.plots.page import figure, save_figure
+from dmoc.scene.named import attached_as_named
+
+
+def plot(solution: Any, path: str | os.PathLike | None = None) -> Any:
+    """`Solution.plot`."""
+    return figure(solution) if path is None else save_figure(solution, path)
+
+
+def facts(solution: Any) -> Facts:
+    """`Solution.facts`."""
+    return facts_of(solution if solution.problem is not None else attached_as_named(solution))
+
+
+def html(solution: Any) -> str:
+    """`Solution._repr_html_`."""
+    return page(solution)
+
+
+def table(solution: Any) -> Any:
+    """`Solution.table`."""
+    return node_table(solution)
