@@ -17,12 +17,12 @@ from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
 from dmoc.checks.report import Check as Check
 from dmoc.checks.report import Report as Report
+from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
 from dmoc.results.flown_cost import unpriced
 from dmoc.results.solution import Solution
-from dmoc.results.wrong_way import WORTH, share_of, told
 from dmoc.scene.problem import TransferProblem
 
 # A row of motion, as a force, may be off by this part of the largest force of actuator or scene [-].

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.iterate import SEEN, in_units
+from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
 from dmoc.missions.path import MissionPath, kicks_of
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import Kick, MissionSolution
@@ -20,7 +21,6 @@ from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, reported
-from dmoc.results.wrong_way import in_two_pieces, turned_round
 from dmoc.scene.mission import Mission
 from dmoc.solver.rung import cut_short
 

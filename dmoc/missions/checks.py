@@ -14,10 +14,10 @@ from dmoc.checks.optimality import idle, left_over
 from dmoc.checks.primer import primer_check
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report, not_finite, own_checks, refuse_twins
 from dmoc.checks.worst import fastest, worst_of
+from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.missions.path import MissionPath
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
-from dmoc.results.wrong_way import WORTH, share_of, told
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8

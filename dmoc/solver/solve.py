@@ -7,11 +7,11 @@ from functools import partial
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.diagnosis.wrong_way import STUCK, in_two_pieces, turned_round
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
-from dmoc.results.wrong_way import STUCK, in_two_pieces, turned_round
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
