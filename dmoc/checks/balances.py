@@ -111,3 +111,14 @@ def amplification(matrices: np.ndarray) -> float:
         to_goal = since_start
     sizes = np.sqrt(np.square([since_start, to_goal]).sum(axis=(2, 3)))
     return float(np.nan_to_num(sizes.max(), nan=np.inf))
+
+
+def misses(evidence: Evidence, off: np.ndarray) -> str:
+    """Errors of position and velocity in words, one entry a freedom each."""
+    moved, slipped = np.split(off, 2)
+    speeds, parts = evidence.speeds, []
+    if speeds.any():
+        parts += [f"{moved[speeds].max():.2g} m", f"{slipped[speeds].max():.2g} m/s"]
+    if evidence.rates.any():
+        parts.append(f"{np.degrees(np.linalg.norm(moved[evidence.rates])):.2g} degrees")
+    return ", ".join(parts)

@@ -11,12 +11,13 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, of_kind, short
 from dmoc.basics.digits import lasting
-from dmoc.checks.balances import amplification, balance, energy_gap
+from dmoc.checks.balances import amplification, balance, energy_gap, misses
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
 from dmoc.checks.optimality import stationarity
 from dmoc.checks.report import Check as Check
 from dmoc.checks.report import Report as Report
+from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
@@ -162,19 +163,8 @@ def _rollout(evidence: Evidence) -> Check:
         evidence.rounding / evidence.extent + (evidence.rounding / evidence.shortest + turned) / evidence.speed
     )
     limit = np.min([ROLLOUT * max(1.0, growth) + floor, ROLLOUT_MOST])
-    note = f"{_misses(evidence, off)}; path amplifies errors {growth:.2g} times"
+    note = f"{misses(evidence, off)}; path amplifies errors {growth:.2g} times"
     return Check.of("rollout", np.max(off / sizes), limit, "of the path", note)
-
-
-def _misses(evidence: Evidence, off: np.ndarray) -> str:
-    """Errors of position and velocity in words, one entry a freedom each."""
-    moved, slipped = np.split(off, 2)
-    speeds, parts = evidence.speeds, []
-    if speeds.any():
-        parts += [f"{moved[speeds].max():.2g} m", f"{slipped[speeds].max():.2g} m/s"]
-    if evidence.rates.any():
-        parts.append(f"{np.degrees(np.linalg.norm(moved[evidence.rates])):.2g} degrees")
-    return ", ".join(parts)
 
 
 def _reference(evidence: Evidence) -> Check:
@@ -233,6 +223,9 @@ def _bounds(evidence: Evidence) -> Check:
 
 def _optimality(evidence: Evidence) -> Check:
     """First-order conditions: for least effort lambda = -m F, but for what limits of the force add to it."""
+    share = share_of([evidence.solution], evidence.solution.objective)
+    if share > WORTH:
+        return Check.of("optimality", share, WORTH, "of the objective", told(share))
     left = stationarity(evidence)
     note = (
         f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "

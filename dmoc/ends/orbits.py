@@ -56,6 +56,9 @@ class _Around(Boundary):
         """The state near `near` that has these elements; in the plane its third entries are zero."""
         center = np.array(self.center)
         n = len(center)
+        if not np.any(near[0] - center):
+            # In the center itself no direction is nearer than another.
+            near = self._anywhere(1.0)
         fill = np.zeros(3 - n)
         q, v = np.append(near[0] - center, fill), np.append(near[1], fill)
         offset, velocity = nearest_state(wanted, self.mu, q, v)

@@ -273,8 +273,11 @@ def _given_controls(problem: TransferProblem, given: Any, times: np.ndarray) -> 
 def _end_states(problem: TransferProblem, duration: float) -> tuple[np.ndarray, ...]:
     """Start position and velocity, goal position and velocity, with likely values for what is free."""
     (q0, v0), (q1, v1) = end_estimates(problem, duration)
-    q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1), q0)
-    q1 = np.where(np.isnan(q1), q0, q1)
+    # An open place is where the mean of the known velocities leads: a body that gets there fast has not stood
+    # still, and an engine that burns throughout would turn round to do so.
+    drift = duration * 0.5 * (np.nan_to_num(v0) + np.nan_to_num(v1))
+    q0 = np.where(np.isnan(q0), np.where(np.isnan(q1), 0.0, q1 - drift), q0)
+    q1 = np.where(np.isnan(q1), q0 + drift, q1)
     mean = (q1 - q0) / duration
     return q0, np.where(np.isnan(v0), mean, v0), q1, np.where(np.isnan(v1), mean, v1)
 

@@ -46,6 +46,8 @@ class Leg:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ValueError(f"Leg: name must be a word; got {short(self.name)}")
+        if self.duration is not None:
+            checked(self, duration=span_of("Leg: duration", self.duration))
         if self.steps is not None:
             whole("Leg: steps", self.steps, least=2)
         if self.control_degree is not None:
@@ -60,7 +62,7 @@ class Coast(Leg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.actuator not in (None, Unpowered()):
+        if not (self.actuator is None or type(self.actuator) is Unpowered):
             raise ValueError("Coast: there is no actuator in a coast; use Leg(duration, actuator=...)")
         checked(self, actuator=Unpowered())
 
@@ -99,6 +101,25 @@ def span_of(name: str, value: Any) -> float | tuple[float, float]:
     if shortest >= longest:
         raise ValueError(f"{name}: its shortest must be less than its longest; got {shortest:g}, {longest:g} s")
     return shortest, longest
+
+
+def checked_sums(sums: Any, count: int) -> tuple[tuple[int, int, Any], ...]:
+    """Durations of several of `count` legs together; ValueError if they are none."""
+    found, parts = [], entries(sums)
+    if parts is None:
+        raise ValueError(f"sums must be a sequence of (first leg, last leg, duration [s]); got {short(sums)}")
+    for one in parts:
+        given = entries(one)
+        if given is None or len(given) != 3:
+            raise ValueError(f"sums: each must be (first leg, last leg, duration [s]); got {short(one)}")
+        first, last = (whole("sums: a leg", at, least=0) for at in given[:2])
+        if not first < last < count:
+            raise ValueError(
+                f"sums: legs count from 0, the first before the last, and there are {count}; "
+                f"got {first} and {last}"
+            )
+        found.append((first, last, span_of("sums: duration", given[2])))
+    return tuple(found)
 
 
 def both_ends(span: Any) -> tuple[float, float]:

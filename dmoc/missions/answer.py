@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.iterate import SEEN, in_units
+from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
 from dmoc.missions.path import MissionPath, kicks_of
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import Kick, MissionSolution
@@ -34,6 +35,22 @@ def answered(
         found = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
     return _answered(climb, attempt, error, met, tol)
+
+
+def straightened(climb: Any, attempt: Any, most: int) -> Any:
+    """An attempt, or one in at most so many iterations in which no thrust along a line points the wrong way."""
+    if not any(map(in_two_pieces, climb.mission.stretches)):
+        return attempt
+
+    def legs_of(one: Any) -> tuple[Sequence[Solution], float]:
+        found = _answered(climb, one, None, True, None)
+        return found.legs, found.objective
+
+    def again(legs: list) -> Any:
+        other = climb.attempt(replace(attempt.path, legs=tuple(legs), forces={}), most=most)
+        return other if other.solved else None
+
+    return turned_round(attempt, legs_of, again, climb.mission.objective.sense)
 
 
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:

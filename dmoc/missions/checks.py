@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,18 +11,18 @@ import numpy as np
 
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.optimality import idle, left_over
+from dmoc.checks.primer import primer_check
 from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report, not_finite, own_checks, refuse_twins
+from dmoc.checks.worst import fastest, worst_of
+from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.missions.path import MissionPath
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
-from dmoc.results.solution import Solution
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8
 # A leg is judged by its own extent and speed, but at least by this part of the mission's [-].
 LEAST = 1e-2
-# Another impulse helps if the primer vector is longer than its length at impulses by this part [-].
-HELPS = 1e-4
 
 
 def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequence = ()) -> Report:
@@ -56,31 +56,6 @@ def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequenc
         checks += [worst_of(mission.leg_names, legs, check) for _, check in own]
     refuse_twins(checks)
     return Report(tuple(checks), time.perf_counter() - begun)
-
-
-def fastest(leg: Solution) -> float:
-    """The largest speed at the step ends of a leg [m/s]."""
-    return float(np.linalg.norm(leg.velocity, axis=1).max(initial=0.0))
-
-
-def worst_of(
-    names: Sequence[str], legs: Sequence[Evidence], check: Callable[[Evidence], Check], named: bool = False
-) -> Check:
-    """The check of the leg in which it is nearest to its limit, or beyond it; an only leg is not `named`."""
-    found = [check(leg) for leg in legs]
-
-    def share(one: Check) -> float:
-        if one.value is None:
-            return -1.0
-        if not one.ok:
-            return np.inf
-        return one.value / one.limit if one.limit else 0.0
-
-    worst = int(np.argmax([share(one) for one in found]))
-    if len(legs) == 1 and not named:
-        return found[0]
-    name = names[worst]
-    return replace(found[worst], note=f"{name}: {found[worst].note}" if found[worst].note else name)
 
 
 class Whole:
@@ -123,6 +98,10 @@ class Whole:
 
     def optimality(self) -> Check:
         """First-order conditions of the mission, and whether the objective is the cost of the path."""
+        legs = getattr(self.solution, "members", None) or self.solution.legs
+        share = share_of(legs, self.solution.objective)
+        if share > WORTH:
+            return Check.of("optimality", share, WORTH, "of the objective", told(share))
         program, (lbx, ubx, lbg, ubg) = self.program, self.program.bounds()
         found = []
         for placed in program.legs:
@@ -146,26 +125,3 @@ class Whole:
         stated = abs(self.cost - sense * self.solution.objective) / program.cost
         note = f"control {force:.0e}, costate {path:.0e}, limits {limits:.0e}, objective {stated:.0e}"
         return Check.of("optimality", max(force, path, limits, stated), OPTIMALITY, "-", note)
-
-
-def primer_check(solution: MissionSolution) -> Check:
-    """Whether another impulse would help: the primer vector is longer there than at impulses (Lawden, 1963)."""
-    times, sizes = solution.primer
-    worth = worth_of(solution)
-    if worth is None:
-        return Check("primer", None, None, "-", True, "the objective does not count velocity changes alone")
-    place = int(np.argmax(sizes))
-    longest = float(sizes[place]) / worth
-    if longest <= 1 + HELPS:
-        return Check("primer", longest, None, "-", True, "no further impulse would help")
-    note = (
-        f"another impulse near {times[place]:.6g} s would help: {longest - 1:.2g} m/s saved for each m/s there"
-    )
-    return Check("primer", longest, None, "-", True, note)
-
-
-def worth_of(solution: MissionSolution) -> float | None:
-    """What 1 m/s costs by the objective, where only impulses are paid for; else None."""
-    objective = solution.require_problem().objective
-    terms: Any = [(weight, term) for weight, term in objective.terms if weight]
-    return float(terms[0][0]) if len(terms) == 1 and float(terms[0][1].kick(1.0, 1.0)) == 1.0 else None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.diagnosis.legs import mission_cause
-from dmoc.missions.answer import answered
+from dmoc.missions.answer import answered, straightened
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
 from dmoc.missions.path import MissionPath, cold
 from dmoc.missions.program import MissionProgram
@@ -255,6 +255,7 @@ def solve_mission(
             first = climb.explained(path, first)
         if not first.solved:
             return answered(climb, first)
+        first = straightened(climb, first, MOST_TRYING)
         first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
         if steps is not None and tol is None:
             return answered(climb, first)
@@ -265,6 +266,8 @@ def first_path(mission: Mission, order: int | None, steps: int | None, hold: boo
     """The path to start from, on its first meshes."""
     given = mission.guess if guess is None else guess
     given = getattr(given, "path", given)
+    if isinstance(given, MissionPath) and not given.suits(mission):
+        given = given.as_arrays()
     if isinstance(given, MissionPath):
         return given.onto(meshes_along(mission, given, order, steps)) if order or steps else given
     orders = [leg.order or order or ORDER for leg in mission.plan]

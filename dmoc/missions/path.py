@@ -44,6 +44,29 @@ class MissionPath:
     near: bool = False
     idle: tuple[str, ...] = ()
 
+    def suits(self, mission: Mission) -> bool:
+        """Whether its legs and joints have the unknowns of this mission."""
+        sizes = [(leg.position.shape[1], leg.control.shape[1]) for leg in self.legs]
+        wanted = [(leg.size, leg.controls) for leg in mission.stretches]
+        own = {name for name, values in self.own.items() if len(values)}
+        axes = mission.dimension
+        # At the start the velocity before its events is an unknown, too.
+        named = {
+            joint.name
+            for joint in mission.joints
+            if any(event.unknowns(axes) or joint.left is None for event in joint.events)
+        }
+        return sizes == wanted and own == named
+
+    def as_arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s] and positions of the nodes of all legs; where legs meet the later one counts."""
+        if not (np.diff(self.begins) > 0).all():
+            raise ValueError("guess is of several bodies at one time; give that of one of them")
+        parts = zip(self.begins, self.legs, strict=True)
+        times = np.concatenate([begin + leg.duration * leg.fractions for begin, leg in parts])
+        last = np.append(np.diff(times) > 0, True)
+        return times[last], np.concatenate([leg.position for leg in self.legs])[last]
+
     def as_one(self, controls: int) -> DiscretePath:
         """The path of all legs as that of a transfer with so many controls, without multipliers."""
         order = max(leg.order for leg in self.legs)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.missions.checks import worth_of
+from dmoc.checks.primer import worth_of
 from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,

@@ -12,7 +12,7 @@ from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose
 from dmoc.legs.events import Event, Impulse
-from dmoc.legs.legs import Joint, Leg, both_ends, span_of
+from dmoc.legs.legs import Joint, Leg, both_ends, checked_sums, span_of
 from dmoc.legs.objectives import DeltaV, Share
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
@@ -81,6 +81,10 @@ class Mission:
                 raise ValueError(f"{name} must be a dmoc.Boundary; got {short(getattr(self, name))}")
         if not isinstance(self.objective, Objective):
             raise ValueError(f"objective must be a dmoc.Objective; got {short(self.objective)}")
+        if getattr(self.start, "closes", False):
+            raise ValueError(
+                "start cannot be Periodic(), which repeats the start; use it as the goal, and Free()"
+            )
         checked(self, mass=number("mass", self.mass, "kg", positive=True))
         parts = entries(self.legs)
         if parts is None or not all(isinstance(part, (Leg, Event)) for part in parts):
@@ -91,6 +95,11 @@ class Mission:
         checked(self, legs=tuple(parts))
         if not any(isinstance(part, Leg) for part in self.legs):
             raise ValueError("legs has no leg; give at least one Leg or Coast")
+        if self.dropped >= self.mass:
+            raise ValueError(
+                f"Drop leaves {self.dropped:g} kg behind in all, but the body has {self.mass:g} kg at the "
+                "start; drop less or give it more mass"
+            )
         if self.duration is not None:
             checked(self, duration=span_of("duration", self.duration))
         span = entries(self.start_time)
@@ -103,6 +112,7 @@ class Mission:
                     f"start_time must be one time or (earliest, latest) [s]; got {short(self.start_time)}"
                 )
             checked(self, start_time=times)
+        checked(self, sums=checked_sums(self.sums, len(self.plan)))
         self._check_spans()
         self._complete_ends()
         for part in self.legs:

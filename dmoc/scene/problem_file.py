@@ -77,7 +77,8 @@ class ProblemFile:
         for name, value in values.items():
             _check_type(name, value, self.parameter(name).default)
         made = _guarded(self.path, lambda: self.function(**values))
-        if not (isinstance(made, TransferProblem) or hasattr(made, "joints") or hasattr(made, "together")):
+        known = isinstance(made, TransferProblem) or hasattr(made, "joints") or hasattr(made, "together")
+        if not known or isinstance(made, type):  # a class has the attributes of its objects
             wanted = f"{FUNCTION}() must return a dmoc.TransferProblem, a dmoc.Mission or a dmoc.Team"
             raise ValueError(f"{self.path}: {wanted}; it returned {_short(made)}")
         made = replace(made, name=self.name, parameters={p.name: p.default for p in self.parameters} | values)

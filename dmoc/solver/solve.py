@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.diagnosis.wrong_way import STUCK, in_two_pieces, turned_round
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
-from dmoc.solver.ladder import Ladder
+from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
 from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
@@ -49,6 +51,16 @@ def solve(
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
         solution = _solved(ladder, order, steps, tol, hold, mesh, guess)
+
+        def again(paths: list[DiscretePath]) -> Solution | None:
+            other = _solved(ladder, order, steps, tol, hold, mesh, *paths)
+            return other if other.optimal else None
+
+        if solution.optimal:
+            sense = problem.objective.sense
+            solution = turned_round(solution, lambda one: ((one,), one.objective), again, sense)
+        elif in_two_pieces(problem) and solution.status in UNEXPLAINED:
+            return replace(solution, message=STUCK)
         # To solve again from the program's own guess would take longer than the warm start from an answer of
         # this process; of one from a file nobody knows what it answers.
         former = own is None or isinstance(own, DiscretePath) or getattr(own, "problem", None) is not None

@@ -13,7 +13,8 @@ import numpy as np
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.limits import Excess
 from dmoc.checks.verification import CHECKS, Check, Report, not_finite, own_checks, refuse_twins
-from dmoc.missions.checks import LEAST, Whole, fastest, worst_of
+from dmoc.checks.worst import fastest, worst_of
+from dmoc.missions.checks import LEAST, Whole
 from dmoc.results.between import BOUND
 from dmoc.teams.cuts import team_cuts
 from dmoc.teams.program import TeamProgram

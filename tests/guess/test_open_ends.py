@@ -122,3 +122,10 @@ def test_a_guessed_duration_is_long_enough_for_the_thrust_however_wide_the_bound
         1.0, CIRCLE, goal, (0.1, 1e9), effects=GRAVITY, actuator=BallForce(limit), objective=Time()
     )
     assert least < guess_duration(problem) < most
+
+
+def test_a_place_that_is_left_open_is_where_the_known_velocities_lead():
+    problem = TransferProblem(1.0, State((1, 5), (0, 2)), State((None, None), (4, None)), 3.0)
+    assert starting_guess(problem, uniform_mesh(4), 2, False).position[-1] == pytest.approx([1 + 6, 5 + 3])
+    back = TransferProblem(1.0, State((None, 0), (4, 0)), State((1, 5), (0, 2)), 3.0)
+    assert starting_guess(back, uniform_mesh(4), 2, False).position[0] == pytest.approx([1 - 6, 0])

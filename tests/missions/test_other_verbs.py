@@ -21,6 +21,7 @@ from dmoc import (
     PointGravity,
     State,
     UniformGravity,
+    Via,
     solve,
 )
 from dmoc.cli.app import main
@@ -266,3 +267,22 @@ def test_a_guess_that_stands_still_divides_by_nothing():
     with np.errstate(all="raise"):
         path = guessed(mission, [(uniform_mesh(4), 2)] * 2)
     assert np.isfinite(path.mass).all()
+
+
+def test_a_former_answer_of_other_legs_is_a_guess_of_the_path():
+    gate = Mission(
+        1.0,
+        State((0, 0), (0, 0)),
+        State((2, 0), (0, 0)),
+        [Leg((0.1, 1.9)), Via((1, 1)), Leg((0.1, 1.9))],
+        duration=2.0,
+    )
+    apart, between = solve(hohmann(), order=4, steps=10), solve(gate, order=4, steps=4)
+    assert solve(gate, guess=apart, order=4, steps=4).objective == pytest.approx(15.0)
+    # this one begins in the center of the orbit, where no direction is nearer than another
+    solve(hohmann(), guess=between, order=4, steps=10)
+    other = replace(
+        gate, start=State((0, 0, 0), (0, 0, 0)), goal=State((2, 0, 0), (0, 0, 0)), legs=[Leg(1.0), Leg(1.0)]
+    )
+    with pytest.raises(ValueError, match="it has 2 axes, and needs 3"):
+        solve(other, guess=between)

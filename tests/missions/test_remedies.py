@@ -3,10 +3,28 @@
 from __future__ import annotations
 
 import re
+from decimal import Decimal
 
+import numpy as np
 import pytest
 
-from dmoc import BallForce, CircularOrbit, Coast, DeltaV, Impulse, Leg, Mission, PointGravity, State, Via, solve
+from dmoc import (
+    BallForce,
+    CircularOrbit,
+    Coast,
+    DeltaV,
+    Drop,
+    Free,
+    Impulse,
+    Leg,
+    Mission,
+    Periodic,
+    PointGravity,
+    State,
+    Via,
+    solve,
+)
+from dmoc.scene.problem_file import load_problem
 
 # The larger one of the two impulses of Hohmann's transfer from radius 1 to radius 2 with mu = 1.
 LARGER = (2 * 2 / 3) ** 0.5 - 1
@@ -56,3 +74,39 @@ def test_what_was_asked_stands_in_the_ladder():
     failed = solve(gates(3.0))
     assert [level.question for level in failed.ladder if level.question]
     assert all(level.status for level in failed.ladder)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"sums": None}, "sums must be a sequence"),
+        ({"sums": [1]}, "sums: each must be"),
+        ({"sums": [(0, 5, 1.0)]}, "there are 2; got 0 and 5"),
+        ({"sums": [(1, 0, 1.0)]}, "the first before the last"),
+        ({"sums": [(0, 1, -1.0)]}, "sums: duration must be greater than 0"),
+        ({"legs": [Leg(1.0), Drop(0.6), Leg(1.0), Drop(0.4)]}, "Drop leaves 1 kg behind in all"),
+        ({"start": Periodic(2)}, "start cannot be Periodic"),
+    ],
+)
+def test_what_can_never_be_flown_is_refused_when_the_mission_is_made(change, told):
+    parts = dict(mass=1.0, start=Free(2), goal=State((1, 0), (0, 0)), legs=[Leg(1.0), Leg(1.0)])
+    with pytest.raises(ValueError, match=re.escape(told)):
+        Mission(**(parts | change))
+
+
+def test_a_duration_is_checked_by_its_leg_and_may_be_any_kind_of_number():
+    with pytest.raises(ValueError, match=re.escape("Leg: duration must be greater than 0 [s]; got -1")):
+        Leg(-1)
+    with pytest.raises(ValueError, match="its shortest must be less than its longest"):
+        Leg((2.0, 1.0))
+    assert Leg(Decimal("1.5")).duration == 1.5
+    assert Leg(np.array([1, 2])).duration == (1.0, 2.0)
+    with pytest.raises(ValueError, match="Coast: there is no actuator in a coast"):
+        Coast(1.0, actuator=np.array([1, 2]))
+
+
+def test_a_problem_file_must_not_return_a_class(tmp_path):
+    file = tmp_path / "made.py"
+    file.write_text("from dmoc import Mission\n\n\ndef problem():\n    return Mission\n")
+    with pytest.raises(ValueError, match=r"problem\(\) must return a dmoc\.TransferProblem"):
+        load_problem(str(file)).make()

@@ -165,7 +165,8 @@ MAKES = {
     "Meet": {"velocity": True, "between": ()},
     "Team": {"members": (FIRST, SECOND), "together": (), "names": (), "guess": None},
     "Mission": scene(
-        legs=(Leg(4.0),),
+        legs=(Leg(), Leg()),
+        sums=((0, 1, 4.0),),
         effects=(),
         actuator=FreeForce(),
         objective=Effort(),
