@@ -125,3 +125,14 @@ def checked_sums(sums: Any, count: int) -> tuple[tuple[int, int, Any], ...]:
 def both_ends(span: Any) -> tuple[float, float]:
     """Shortest and longest of a duration, the same where it is one number."""
     return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]
+
+
+def start_times(value: Any) -> Any:
+    """The time of a start, or (earliest, latest) [s]; ValueError if it is neither."""
+    span = entries(value)
+    if span is None:
+        return number("start_time", value, "s")
+    times = tuple(number("start_time", each, "s") for each in span)
+    if len(times) != 2 or times[0] >= times[1]:
+        raise ValueError(f"start_time must be one time or (earliest, latest) [s]; got {short(value)}")
+    return times

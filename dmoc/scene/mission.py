@@ -12,7 +12,7 @@ from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose
 from dmoc.legs.events import Event, Impulse
-from dmoc.legs.legs import Joint, Leg, both_ends, checked_sums, span_of
+from dmoc.legs.legs import Joint, Leg, both_ends, checked_sums, span_of, start_times
 from dmoc.legs.objectives import DeltaV, Share
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
@@ -102,16 +102,7 @@ class Mission:
             )
         if self.duration is not None:
             checked(self, duration=span_of("duration", self.duration))
-        span = entries(self.start_time)
-        if span is None:
-            checked(self, start_time=number("start_time", self.start_time, "s"))
-        else:
-            times = tuple(number("start_time", each, "s") for each in span)
-            if len(times) != 2 or times[0] >= times[1]:
-                raise ValueError(
-                    f"start_time must be one time or (earliest, latest) [s]; got {short(self.start_time)}"
-                )
-            checked(self, start_time=times)
+        checked(self, start_time=start_times(self.start_time))
         checked(self, sums=checked_sums(self.sums, len(self.plan)))
         self._check_spans()
         self._complete_ends()
