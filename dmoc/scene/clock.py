@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
+from dmoc.basics.arguments import entries
 from dmoc.legs.legs import both_ends
 
 
@@ -90,7 +91,9 @@ def _parts(scene: Any) -> list[Any]:
     """The parts of a scene that may hold the motion of a body."""
     if hasattr(scene, "together"):
         return [part for one in scene.members for part in _parts(one)]
-    return [scene.start, scene.goal, *scene.effects, *scene.constraints, *getattr(scene, "legs", ())]
+    # Where every leg has effects of its own, nobody has looked at those of the mission: one may stand alone.
+    several = [entries(part) or (part,) for part in (scene.effects, scene.constraints)]
+    return [scene.start, scene.goal, *several[0], *several[1], *getattr(scene, "legs", ())]
 
 
 def _dated(parts: Any) -> Iterator[Any]:
