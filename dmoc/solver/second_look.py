@@ -121,8 +121,8 @@ def _may_be_dear(ladder: Ladder, rung: Rung) -> bool:
     if not problem.limited and taken > WANDERED:
         return True
     if len(problem.effects) > 1:
-        # What an oblate body or the air takes is no matter of the phase: between two states in low orbit that was
-        # most of the effort, and the look took 1.6 s for nothing.
+        # What an oblate body or the air takes is no matter of the phase: between two states in low orbit that
+        # was most of the effort, and the look took 1.6 s for nothing.
         return False
     force = np.linalg.norm(force_of(ladder.dynamics, path), axis=1)
     weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
