@@ -148,3 +148,8 @@ def times_each(value: float | Vector, factor: float) -> float | tuple[float, ...
 
 def _in(unit: str) -> str:
     return f" [{unit}]" if unit else ""
+
+
+def both_ends(span: Any) -> tuple[float, float]:
+    """Shortest and longest of a duration, the same where it is one number."""
+    return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]

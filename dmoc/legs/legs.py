@@ -122,11 +122,6 @@ def checked_sums(sums: Any, count: int) -> tuple[tuple[int, int, Any], ...]:
     return tuple(found)
 
 
-def both_ends(span: Any) -> tuple[float, float]:
-    """Shortest and longest of a duration, the same where it is one number."""
-    return tuple(span) if isinstance(span, (tuple, list)) else (span, span)  # type: ignore[return-value]
-
-
 def start_times(value: Any) -> Any:
     """The time of a start, or (earliest, latest) [s]; ValueError if it is neither."""
     span = entries(value)

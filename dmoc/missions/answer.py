@@ -15,12 +15,9 @@ from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
 from dmoc.missions.path import MissionPath, kicks_of
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import Kick, MissionSolution
-from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.march import force_of
-from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.results.solution import NOT_MET, Solution, part_solution
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.mission import Mission
 from dmoc.solver.rung import cut_short
@@ -141,19 +138,7 @@ def _leg_solution(
 ) -> Solution:
     leg = path.legs[index]
     problem = mission.fixed_at(index, path.begins[index], float(leg.mass[0]), leg.duration)
-    dynamics = Dynamics.of(problem)
-    momentum, velocity = end_momenta(dynamics, leg, problem.start_time)
-    return Solution(
-        problem=problem,
-        path=leg,
-        **reported(leg, velocity, momentum, force_of(dynamics, leg)),
-        objective=mission.objective.sense * cost,
-        success=status == "solved",
-        status=status,
-        message="a leg of a mission",
-        ladder=(level,),
-        provenance=Provenance.of(problem),
-    )
+    return part_solution(problem, leg, mission.objective.sense * cost, status, level, "a leg of a mission")
 
 
 def _impulses(mission: Mission, path: MissionPath, legs: Sequence[Solution]) -> tuple[Kick, ...]:

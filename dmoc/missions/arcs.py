@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dmoc.basics.arguments import both_ends
 from dmoc.basics.memory import remembered
 from dmoc.guess.coast import LEAST_SAMPLES, coast
 from dmoc.legs.lambert import lambert
-from dmoc.legs.legs import both_ends
 from dmoc.scene.mission import Mission
 
 # A free time of the start, and a free duration, are tried at this many values.

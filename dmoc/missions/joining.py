@@ -14,10 +14,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import both_ends
 from dmoc.configurations.base import Configuration
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Instant, fixed_rows
-from dmoc.legs.legs import Joint, both_ends
+from dmoc.legs.legs import Joint
 from dmoc.missions.path import MissionPath
 from dmoc.missions.within import Placed
 from dmoc.motion.dynamics import Dynamics

@@ -13,7 +13,17 @@ import numpy as np
 from dmoc.basics.arguments import of_kind
 from dmoc.missions.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.netcdf import Format, Table, as_array, damage_told, read_table, write_table
+from dmoc.results.netcdf import (
+    Format,
+    Table,
+    as_array,
+    damage_told,
+    plain_facts,
+    prefixed,
+    read_table,
+    unprefixed,
+    write_table,
+)
 from dmoc.results.solution import Outcome, Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
 from dmoc.scene.mission import Mission
@@ -194,10 +204,8 @@ def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
     table: Table = {}
     for i, leg in enumerate(solution.legs):
         mine, variables = solution_parts(leg)
-        facts[f"leg_{i + 1}"] = json.dumps({name: _plain(value) for name, value in mine.items()})
-        for name, (dimensions, values, about) in variables.items():
-            prefix = f"leg_{i + 1}_"
-            table[prefix + name] = (tuple(prefix + one for one in dimensions), values, about)
+        facts[f"leg_{i + 1}"] = plain_facts(mine)
+        table |= prefixed(variables, f"leg_{i + 1}_")
     for kind, found in (("own", solution.own), ("forces", solution.forces)):
         for name, values in found.items():
             key = f"{kind}_{name.replace(' ', '_')}"
@@ -208,19 +216,11 @@ def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
     return facts, table
 
 
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _read(facts: dict[str, Any], table: Table, make: Callable) -> MissionSolution:
     legs = []
     for i in range(int(facts["legs"])):
         prefix = f"leg_{i + 1}_"
-        mine = {
-            name.removeprefix(prefix): (tuple(one.removeprefix(prefix) for one in dimensions), values, about)
-            for name, (dimensions, values, about) in table.items()
-            if name.startswith(prefix)
-        }
+        mine = unprefixed(table, prefix)
         legs.append(solution_of(json.loads(facts[f"leg_{i + 1}"]), mine, make))
     joints: dict[str, dict[str, np.ndarray]] = {"own": {}, "forces": {}}
     for name, (_, _, about) in table.items():

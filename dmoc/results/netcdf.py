@@ -8,6 +8,7 @@ text from a file and runs nothing.
 from __future__ import annotations
 
 import io
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -153,3 +154,25 @@ def as_array(table: Table, name: str) -> np.ndarray:
     if name not in table:
         raise ValueError(f"it lacks the variable {name!r}")
     return np.array(table[name][1], float)
+
+
+def prefixed(table: Table, prefix: str) -> Table:
+    """A table with a prefix before all its names."""
+    return {
+        prefix + name: (tuple(prefix + one for one in dimensions), values, about)
+        for name, (dimensions, values, about) in table.items()
+    }
+
+
+def unprefixed(table: Table, prefix: str) -> Table:
+    """The part of a table whose names have a prefix, without it."""
+    return {
+        name.removeprefix(prefix): (tuple(one.removeprefix(prefix) for one in dimensions), values, about)
+        for name, (dimensions, values, about) in table.items()
+        if name.startswith(prefix)
+    }
+
+
+def plain_facts(facts: dict[str, Any]) -> str:
+    """Attributes as a text of JSON, in which NumPy's numbers are plain ones."""
+    return json.dumps({k: v.item() if isinstance(v, np.generic) else v for k, v in facts.items()})

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.march import force_of
+from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import COSTATE, DiscretePath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.moments import Moment, moment, named_body
@@ -253,6 +256,25 @@ def reported(path: DiscretePath, velocity: np.ndarray, momentum: np.ndarray, for
     if made.spins.any():
         found |= {"wheel_momentum": velocity[:, made.spins], "wheel_torque": force[:, made.spins]}
     return found
+
+
+def part_solution(
+    problem: TransferProblem, path: DiscretePath, objective: float, status: str, level: Level, words: str
+) -> Solution:
+    """A part of an answer, as the answer of a transfer; `words` say of what."""
+    dynamics = Dynamics.of(problem)
+    momentum, velocity = end_momenta(dynamics, path, problem.start_time)
+    return Solution(
+        problem=problem,
+        path=path,
+        **reported(path, velocity, momentum, force_of(dynamics, path)),
+        objective=objective,
+        success=status == "solved",
+        status=status,
+        message=words,
+        ladder=(level,),
+        provenance=Provenance.of(problem),
+    )
 
 
 def load(path: str | os.PathLike) -> Solution:

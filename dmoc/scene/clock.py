@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
-from dmoc.basics.arguments import entries
-from dmoc.legs.legs import both_ends
+from dmoc.basics.arguments import both_ends, entries
 
 
 class Clock(NamedTuple):

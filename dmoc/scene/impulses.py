@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from dmoc.basics.arguments import both_ends
 from dmoc.legs.events import Impulse
-from dmoc.legs.legs import Leg, both_ends
+from dmoc.legs.legs import Leg
 from dmoc.scene.mission import Mission
 
 # A part of a coast lasts at least this part of it [-].

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.basics.arguments import both_ends, checked, entries, number, short
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose
 from dmoc.legs.events import Event, Impulse
-from dmoc.legs.legs import Joint, Leg, both_ends, checked_sums, span_of, start_times
+from dmoc.legs.legs import Joint, Leg, checked_sums, span_of, start_times
 from dmoc.legs.objectives import DeltaV, Share
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint

@@ -7,14 +7,10 @@ from typing import Any
 
 from dmoc.basics.digits import lasting
 from dmoc.missions.answer import costs_of, worst_rows
-from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.march import force_of
-from dmoc.motion.momenta import end_momenta
 from dmoc.nlp.ipopt import STATUSES
-from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.solution import NOT_MET, Solution, reported
+from dmoc.results.facts import Error, Provenance
+from dmoc.results.solution import NOT_MET, part_solution
 from dmoc.scene.clock import cautions_of, dates_of
-from dmoc.scene.problem import TransferProblem
 from dmoc.scene.team import Team
 from dmoc.solver.rung import cut_short
 from dmoc.teams.cuts import team_cuts
@@ -51,12 +47,13 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     )
     costs = costs_of(program, answer.x)
     members = [
-        _member(
-            team.fixed_at(i, team.start_time, float(leg.mass[0]), path.duration),
+        part_solution(
+            one := team.fixed_at(i, team.start_time, float(leg.mass[0]), path.duration),
             leg,
-            float(cost),
-            attempt.level,
+            one.objective.sense * float(cost),
             answer.status,
+            attempt.level,
+            "a body of a team",
         )
         for i, (leg, cost) in enumerate(zip(path.legs, costs, strict=True))
     ]
@@ -77,22 +74,6 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         error=error,
         reason=f"{len(members)} bodies on {len(path.mesh) - 1} steps",
         provenance=about,
-    )
-
-
-def _member(problem: TransferProblem, path: Any, cost: float, level: Level, status: str) -> Solution:
-    dynamics = Dynamics.of(problem)
-    momentum, velocity = end_momenta(dynamics, path, problem.start_time)
-    return Solution(
-        problem=problem,
-        path=path,
-        **reported(path, velocity, momentum, force_of(dynamics, path)),
-        objective=problem.objective.sense * cost,
-        success=status == "solved",
-        status=status,
-        message="a body of a team",
-        ladder=(level,),
-        provenance=Provenance.of(problem),
     )
 
 

@@ -12,7 +12,17 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.results.facts import Error, Level, Provenance
-from dmoc.results.netcdf import Format, Table, as_array, damage_told, read_table, write_table
+from dmoc.results.netcdf import (
+    Format,
+    Table,
+    as_array,
+    damage_told,
+    plain_facts,
+    prefixed,
+    read_table,
+    unprefixed,
+    write_table,
+)
 from dmoc.results.solution import Outcome, Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
 from dmoc.scene.team import Team
@@ -171,9 +181,8 @@ def _written(solution: TeamSolution) -> tuple[dict[str, Any], Table]:
     for i, one in enumerate(solution.members):
         mine, variables = solution_parts(one)
         prefix = f"body_{i + 1}_"
-        facts[prefix.rstrip("_")] = json.dumps({name: _plain(value) for name, value in mine.items()})
-        for name, (dimensions, values, about) in variables.items():
-            table[prefix + name] = (tuple(prefix + at for at in dimensions), values, about)
+        facts[prefix.rstrip("_")] = plain_facts(mine)
+        table |= prefixed(variables, prefix)
     for kind, found in (("forces", solution.forces), ("densities", solution.densities)):
         for i, (name, values) in enumerate(found.items()):
             dimensions = tuple(f"count_{size}" for size in values.shape)
@@ -181,20 +190,12 @@ def _written(solution: TeamSolution) -> tuple[dict[str, Any], Table]:
     return facts, table
 
 
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _read(facts: dict[str, Any], table: Table, make: Callable) -> TeamSolution:
     names = tuple(map(str, json.loads(facts["names"])))
     members = []
     for i in range(len(names)):
         prefix = f"body_{i + 1}_"
-        mine = {
-            name.removeprefix(prefix): (tuple(one.removeprefix(prefix) for one in dimensions), values, about)
-            for name, (dimensions, values, about) in table.items()
-            if name.startswith(prefix)
-        }
+        mine = unprefixed(table, prefix)
         members.append(solution_of(json.loads(facts[prefix.rstrip("_")]), mine, make))
     if len({(len(one.path.mesh), one.order, one.hold) for one in members}) > 1:
         raise ValueError("its bodies do not share one mesh")
