@@ -49,7 +49,13 @@ def row(name: str, words: str, solution: Solution, holds: bool) -> str:
     seconds = solution.build_s + solution.solve_s
     value = f"{solution.objective:.6g} {solution.provenance.objective_unit}".replace("^2", "\u00b2").rstrip()
     found = value if holds else f"{value} (a check fails)" if solution.success else solution.status
-    cells = (f"[{name}](../problems/gallery/{name}.png)", words, f"`dmoc solve {name}`", found, f"{seconds:.2g}")
+    cells = (
+        f"[{name}](../problems/gallery/{name}.png)",
+        words,
+        f"`dmoc solve {name}`",
+        found,
+        f"{seconds:.2g}",
+    )
     return f"| {' | '.join(cells)} |"
 
 

@@ -46,7 +46,9 @@ def test_the_first_commands_end_as_the_front_page_says(tmp_path, monkeypatch):
 
 def test_the_first_scene_has_the_numbers_of_the_front_page(tmp_path, monkeypatch):
     names = play(SECTIONS[FIRST[1]], tmp_path, monkeypatch)
-    effort, force = map(float, re.search(r"effort of ([\d.]+) N² s, its\s+largest force is ([\d.]+) N", ALL).groups())
+    effort, force = map(
+        float, re.search(r"effort of ([\d.]+) N² s, its\s+largest force is ([\d.]+) N", ALL).groups()
+    )
     assert names["solution"].objective == pytest.approx(effort, abs=0.06)
     assert names["solution"].facts()["peak force"].value == pytest.approx(force, abs=0.06)
 

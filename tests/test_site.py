@@ -55,5 +55,9 @@ def test_formulas_are_mathml(site):
 
 def test_every_public_name_has_its_place_among_the_names():
     """If not: add a line  ::: dmoc.NAME  to a page of docs/api."""
-    named = [name for page in (ROOT / "docs" / "api").glob("*.md") for name in re.findall(r"^::: dmoc\.(\w+)", page.read_text(), re.MULTILINE)]
+    named = [
+        name
+        for page in (ROOT / "docs" / "api").glob("*.md")
+        for name in re.findall(r"^::: dmoc\.(\w+)", page.read_text(), re.MULTILINE)
+    ]
     assert sorted(named) == sorted(dmoc.__all__)
