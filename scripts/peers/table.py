@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import platform
 import re
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from dmoc.reports.words import plain_table
+from dmoc.reports.layout import plain_table
 from peers.tasks import TASKS
 from peers.turns import ACCURACIES, TOOLS, Run, named
 
@@ -46,14 +46,6 @@ def note(runs: Runs, asset: str) -> str:
     machine = f"{os.cpu_count()} shared cores, {platform.machine()}, Python {platform.python_version()}"
     versions = f"CasADi {version('casadi')}" + (f", ASSET {asset}" if asset else "")
     return f"Medians of {said or 'none'} on {machine}; {versions}.\n"
-
-
-def asset_version() -> str:
-    """Of the environment this runs in; empty if it is not there."""
-    try:
-        return version("asset_asrl")
-    except PackageNotFoundError:
-        return ""
 
 
 def markdown(runs: Runs, asset: str) -> str:

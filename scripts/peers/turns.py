@@ -19,11 +19,12 @@ from peers.tasks import TASKS
 ACCURACIES = (1e-3, 1e-5, 1e-7)
 # Names of the tools in the table, in its order.
 TOOLS = {"asset": "ASSET", "casadi": "CasADi by hand", "dmoc": "dmoc"}
-# Solves after the first in a process whose times count as warm.
-WARM = 2
+# Solves after the first in a process whose times count as warm: so many, but one where it took longer than
+# BRIEF [s].
+WARM, BRIEF = 2, 0.2
 # A run that takes longer than this [s] does not count.
 PATIENCE = 60
-# Of solves that take longer than this [s], fewer than asked for are timed, but at least LEAST.
+# Solves that take longer than this [s] are timed in the first LEAST turns alone.
 SLOW, LEAST = 2.0, 3
 SCRIPTS = Path(__file__).parents[1]
 # Processor time adds up over threads, and threads that wait in turn cost some.
@@ -69,7 +70,13 @@ class Bench:
                 'Install it with "pip install dmoc[bench]", or name an interpreter that has it by --asset'
             )
 
-    def once(self, tool: str, task: str, mesh: tuple, again: int = WARM) -> tuple[list[float], Answer] | None:
+    def version_of_asset(self) -> str:
+        """Empty if it is not there."""
+        code = "from importlib.metadata import version; print(version('asset_asrl'))"
+        seen = subprocess.run([self.pythons["asset"], "-c", code], capture_output=True, text=True)
+        return seen.stdout.strip()
+
+    def once(self, tool: str, task: str, mesh: tuple, again: int) -> tuple[list[float], Answer] | None:
         """Times of the solves of one new process [s] and the last answer; None if it fails or takes too long."""
         words = [self.pythons[tool], "-m", "peers.worker", tool, task, json.dumps(mesh), str(again)]
         paths = os.pathsep.join([str(SCRIPTS), str(SCRIPTS.parent)])
@@ -91,9 +98,11 @@ class Bench:
         return found["seconds"], Answer.of(found["answer"])
 
     def tried(self, tool: str, task: str) -> list[tuple[float, Run]]:
-        """All meshes of the short list, with the time of a warm solve [s], untimed for the table."""
-        runs = []
+        """Meshes of the short list up to the best accuracy, with the time of a warm solve [s], not for the table."""
+        runs: list[tuple[float, Run]] = []
         for mesh in MESHES[tool][task]:
+            if any(run.error <= ACCURACIES[-1] for _, run in runs):
+                break
             if (found := self.once(tool, task, mesh, 1)) is not None:
                 seconds, answer = found
                 runs.append((seconds[-1], Run(tool, task, mesh, error(TASKS[task], answer), answer.status)))
@@ -106,7 +115,8 @@ class Bench:
             for run in runs:
                 if turn >= LEAST and median(run.first) > SLOW:
                     continue
-                if (found := self.once(run.tool, run.task, run.mesh)) is not None:
+                again = 1 if run.first and run.first[-1] > BRIEF else WARM
+                if (found := self.once(run.tool, run.task, run.mesh, again)) is not None:
                     run.first.append(found[0][0])
                     run.warm.append(median(found[0][1:]))
             self.told(f"turn {turn + 1} of {repeats}")
