@@ -36,17 +36,61 @@ LIBRARIES = frozenset(
 )
 # A function that uses one of these names may do something else another time.
 CHANGING = frozenset(
-    "__import__ default_rng eval exec fromfile genfromtxt getenv globals input load loadtxt now open perf_counter "
-    "rand randn random read read_csv read_text time".split()
+    [
+        "__import__",
+        "default_rng",
+        "eval",
+        "exec",
+        "fromfile",
+        "genfromtxt",
+        "getenv",
+        "globals",
+        "input",
+        "load",
+        "loadtxt",
+        "now",
+        "open",
+        "perf_counter",
+        "rand",
+        "randn",
+        "random",
+        "read",
+        "read_csv",
+        "read_text",
+        "time",
+    ]
 )
 # Methods that `dataclass` writes follow from the fields, which are known.
 WRITTEN = frozenset(
-    "__init__ __repr__ __eq__ __hash__ __setattr__ __delattr__ __lt__ __le__ __gt__ __ge__ __replace__".split()
+    [
+        "__init__",
+        "__repr__",
+        "__eq__",
+        "__hash__",
+        "__setattr__",
+        "__delattr__",
+        "__lt__",
+        "__le__",
+        "__gt__",
+        "__ge__",
+        "__replace__",
+    ]
 )
 # These entries of a class say nothing of what its objects do.
 ASIDE = frozenset(
-    "__dict__ __weakref__ __doc__ __module__ __annotations__ __firstlineno__ __static_attributes__ "
-    "__dataclass_fields__ __dataclass_params__ __abstractmethods__ _abc_impl".split()
+    [
+        "__dict__",
+        "__weakref__",
+        "__doc__",
+        "__module__",
+        "__annotations__",
+        "__firstlineno__",
+        "__static_attributes__",
+        "__dataclass_fields__",
+        "__dataclass_params__",
+        "__abstractmethods__",
+        "_abc_impl",
+    ]
 )
 # Functions in the class that stand behind a name: of these kinds of descriptors, the parts that count.
 WRAPPED = {
@@ -61,8 +105,8 @@ WRAPPED = {
 class Sources:
     """The contents of one object, and of all that it refers to.
 
-    `plain` gives the identity of a value of a known kind and None for others; it takes the way to the identities
-    of the parts of the value.
+    `plain` gives the identity of a value of a known kind and None for others; it takes the way to the
+    identities of the parts of the value.
     """
 
     def __init__(self, plain: Callable[[Any, Callable], Hashable | None]):
@@ -125,8 +169,10 @@ class Sources:
         bare: Any = None
         for base in (tuple, float, int, str):
             if isinstance(value, base):
-                bare = self.of(base(value))  # type: ignore[call-overload]
-        if any(not base.__flags__ & 1 << 9 for base in kind.__mro__ if base not in (object, tuple, float, int, str)):
+                bare = self.of(base(value))  # type: ignore[arg-type]
+        if any(
+            not base.__flags__ & 1 << 9 for base in kind.__mro__ if base not in (object, tuple, float, int, str)
+        ):
             # Classes of compiled modules may keep more than their fields.
             raise TypeError(kind)
         if any("__slots__" in vars(base) and vars(base)["__slots__"] for base in kind.__mro__):
@@ -154,7 +200,7 @@ def _of_library(module: str, thing: Any) -> str:
 
 @lru_cache(500)
 def _names(code: CodeType) -> tuple[str, ...]:
-    """The names that a piece of code and the functions within it use; TypeError where it may change its mind."""
+    """The names that code and the functions within it use; TypeError where it may change its mind."""
     names = dict.fromkeys(_used(code))
     if CHANGING & names.keys():
         raise TypeError(code)

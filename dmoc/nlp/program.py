@@ -12,12 +12,12 @@ import numpy as np
 from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
+from dmoc.ipopt.run import Answer
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
@@ -42,6 +42,7 @@ class Program:
     rows: Layout
     row_bounds: tuple[np.ndarray, np.ndarray]
     assembly: Assembly
+    numbers: np.ndarray
     chart: Chart | None = None
 
     def accepts(self, problem: TransferProblem) -> None:
@@ -66,10 +67,10 @@ class Program:
             raise ValueError(f"this NLP was built for another {', '.join(changed)}; transcribe the new problem")
 
     def parameters(self, problem: TransferProblem) -> np.ndarray:
-        """The NLP's parameter vector for a problem [SI]."""
+        """The NLP's parameter vector for a problem [SI], with the numbers of its units and mesh behind."""
         fixed = [] if problem.free_duration else [problem.duration_bounds[0]]
         head = [*self.units.origin, problem.start_time, problem.mass, *fixed]
-        return np.concatenate([head, *[values_of(part) for part in problem.adjustable_parts]])
+        return np.concatenate([head, *[values_of(part) for part in problem.adjustable_parts], self.numbers])
 
     def bounds(self, problem: TransferProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""

@@ -12,8 +12,8 @@ from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
+from dmoc.ipopt.run import Answer
 from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
 from dmoc.results.facts import Level

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.digits import time_unit
+from dmoc.ipopt.run import STATUSES
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.estimate import LEAST_FALL, change, estimate, local_errors, rounding_cost
 from dmoc.results.facts import Error
 from dmoc.results.flown_cost import TINY

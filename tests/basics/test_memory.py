@@ -331,7 +331,9 @@ CHANGES = {
 @pytest.mark.parametrize("what", CHANGES)
 def test_what_a_user_wrote_is_known_by_all_that_it_looks_at(what):
     change, touched = CHANGES[what]
-    before, after = ({name: identity(part) for name, part in one.items()} for one in (built(), built(it=change)))
+    before, after = (
+        {name: identity(part) for name, part in one.items()} for one in (built(), built(it=change))
+    )
     assert built()["wind"] is not built()["wind"]
     assert {name for name in before if before[name] != after[name]} == touched
 

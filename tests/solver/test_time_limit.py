@@ -6,7 +6,7 @@ import pytest
 
 from dmoc import load, solve
 from dmoc.cli.app import main
-from dmoc.nlp import ipopt
+from dmoc.ipopt import run as ipopt
 from dmoc.scene.problem_file import load_problem
 
 
