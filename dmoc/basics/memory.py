@@ -74,6 +74,13 @@ class _Meanwhile:
         self.kept: dict[int, Any] = {}
         # Identities of parts by their addresses, each with its part; None where it cannot be told.
         self.known: dict[int, tuple[Any, Hashable]] = {}
+        self._patched: dict[type, bool] = {}
+
+    def is_patched(self, kind: type) -> bool:
+        """As `_is_patched`, looked at once."""
+        if kind not in self._patched:
+            self._patched[kind] = _is_patched(kind)
+        return self._patched[kind]
 
 
 _meanwhile: ContextVar[_Meanwhile | None] = ContextVar("meanwhile", default=None)
@@ -171,7 +178,8 @@ def _plain(value: Any, of: Callable[[Any], Hashable]) -> Hashable | None:
     kind = value if isinstance(value, type) else kind
     if not _is_own(kind):
         return None
-    if _is_patched(kind):
+    now = _meanwhile.get()
+    if _is_patched(kind) if now is None else now.is_patched(kind):
         raise TypeError(kind)
     if isinstance(value, type):
         return value

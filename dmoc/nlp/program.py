@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -204,7 +205,8 @@ class Program:
         body = self.dynamics.configuration
         return body.coordinates if len(body.coordinates.blocks) > 1 or body.surplus else None
 
-    def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
+    @cached_property
+    def densities(self) -> list[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
 
         A multiplier of which there is one a node or a step is divided by the share of the duration that belongs
@@ -212,22 +214,24 @@ class Program:
         """
         shares = {"node": node_weights(self.mesh, self.scheme), "step": np.diff(self.mesh)}
         shares["control"] = shares["step" if self.hold else "node"]
+        found = []
         for layout, side in ((self.columns, "column"), (self.rows, "row")):
             for group in layout.groups:
                 share = shares.get(group.kind, np.ones(group.count))[:, None]
                 scale = 1 / group.scales if side == "column" else group.scales
-                yield Key(group.kind, side, group.name), group, self.units.cost * scale / share
+                found.append((Key(group.kind, side, group.name), group, self.units.cost * scale / share))
+        return found
 
     def path(self, problem: TransferProblem, answer: Answer) -> DiscretePath:
         """SI path and multipliers of an answer."""
         sides = {"column": answer.lam_x, "row": answer.lam_g}
-        multipliers = {key: group.of(sides[key.side]) * unit for key, group, unit in self.densities()}
+        multipliers = {key: group.of(sides[key.side]) * unit for key, group, unit in self.densities}
         return replace(self.unpack(answer.x, problem), multipliers=multipliers)
 
     def multipliers(self, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
         """Scaled multipliers of unknowns and rows; 0 where a path has none."""
         sides = {"column": np.zeros(self.columns.size), "row": np.zeros(self.rows.size)}
-        for key, group, unit in self.densities():
+        for key, group, unit in self.densities:
             if key in path.multipliers:
                 sides[key.side][group.start : group.stop] = (path.multipliers[key] / unit).ravel()
         return sides["column"], sides["row"]

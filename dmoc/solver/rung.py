@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class Rung:
         """Whether the user ended it."""
         return self.answer.status == "stopped"
 
-    @property
+    @cached_property
     def path(self) -> DiscretePath:
         """The path of the answer, with its multipliers."""
         return self.nlp.path(self.problem, self.answer)
