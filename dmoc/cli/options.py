@@ -230,7 +230,9 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def writable(path: Path | None, drawn: bool = False, table: bool = False, moving: bool = False) -> None:
+def writable(
+    path: Path | None, drawn: bool = False, table: bool = False, moving: bool = False, page: bool = False
+) -> None:
     """ValueError unless a file can be written there: said before the work, not after it.
 
     A result takes the place of another one, never that of a problem file or a thesis.
@@ -245,7 +247,11 @@ def writable(path: Path | None, drawn: bool = False, table: bool = False, moving
     special = path.exists() and not path.is_file()
     if special or not os.access(folder, os.W_OK):
         raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
-    if drawn:
+    if page:
+        from dmoc.pages.report import check_page
+
+        check_page(path)
+    elif drawn:
         from dmoc.plots.page import SUFFIXES
 
         if path.suffix.lower() not in SUFFIXES:

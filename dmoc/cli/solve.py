@@ -28,6 +28,7 @@ from dmoc.cli.options import (
     watched,
     writable,
 )
+from dmoc.cli.pages import Dark, draw, drawable
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -46,7 +47,10 @@ def solve(
     hold: Hold = False,
     settings: Settings = None,
     out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the solution here: png, pdf, svg, or html for a page.")
+    ] = None,
+    dark: Dark = False,
     animate: Annotated[Path | None, typer.Option(help="Write a moving picture here (gif or mp4).")] = None,
     guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
     starts: Annotated[
@@ -70,7 +74,7 @@ def solve(
     import dmoc
 
     writable(out)
-    writable(plot, drawn=True)
+    drawable(plot)
     writable(animate, moving=True)
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
@@ -89,9 +93,7 @@ def solve(
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
     if plot is not None:
-        from dmoc.plots.page import save_figure
-
-        save_figure(solution, plot, verdict)
+        draw(solution, plot, verdict, dark)
     if animate is not None:
         dmoc.animate(solution, animate)
     written = [path for path in (out, plot, animate) if path is not None]

@@ -73,6 +73,10 @@ class Atmosphere(Part):
         """Velocity of the air there [m/s], a column; 0 if it is at rest."""
         return 0
 
+    def body_radius(self) -> float:
+        """Radius of the body at the origin that the air is around [m], 0 where there is none."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class UniformAtmosphere(Atmosphere):
@@ -159,6 +163,9 @@ class ExponentialAtmosphere(Atmosphere):
                 f"got {self.height:g} and {self.radius:g} m"
             )
 
+    def body_radius(self) -> float:
+        return self.radius
+
     def check_dimension(self, dimension: int) -> None:
         if dimension == 1:
             raise ValueError("ExponentialAtmosphere needs 2 or 3 dimensions; got 1")
@@ -215,6 +222,9 @@ class Drag(Force):
                 f"atmosphere must be a dmoc.Atmosphere; got {short(self.atmosphere)}: for one density [kg/m^3] "
                 "everywhere give UniformAtmosphere(density)"
             )
+
+    def body_radius(self) -> float:
+        return self.atmosphere.body_radius()
 
     def check_dimension(self, dimension: int) -> None:
         self.atmosphere.check_dimension(dimension)
