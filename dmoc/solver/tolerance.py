@@ -63,12 +63,11 @@ SLOW = 2.0
 FLAT = 0.03
 # A refinement of more iterations than this wanders: others take 20 to 90.
 LONG = 100
-# A refinement that is not held ends after this many iterations: then it is tried anew, and held.
+# One that is not held ends after this many: then it is tried anew, and held.
 LONGEST_FREE = 150
 # A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
 TIGHTER = 10.0
-# A mesh does no better if its change is more than this part of the one before [-]: the error that is estimated
-# from the fall of changes goes up and down.
+# A mesh does no better if its change is more than this part of the one before [-]: estimates go up and down.
 FALLING = 0.95
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
@@ -79,7 +78,7 @@ def climb_to_tolerance(
 ) -> Solution:
     """Refine until the estimated error is below a tolerance, on meshes that each cut steps of the one before.
 
-    A trial on a coarse mesh tells whether the controls switch or limits set in, and so which order pays; without
+    A trial on a coarse mesh tells whether controls switch or limits set in, and so which order pays. Without
     limits it may be the answer. All step ends are kept from mesh to mesh: the answer on one is a good start for
     the next, and the change there tells the error.
     """
@@ -296,6 +295,5 @@ def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
     """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
     found = switches_in_words(problem, path)
-    return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}" + (
-        f"; switches at {found}" if found else ""
-    )
+    words = f"order {path.order}, {len(path.mesh) - 1} steps: {reason}"
+    return f"{words}; switches at {found}" if found else words
