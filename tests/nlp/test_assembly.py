@@ -172,7 +172,7 @@ def test_the_graph_does_not_grow_with_the_number_of_steps(order, hold):
 
     # On small meshes units and mesh are parameters, on large ones they are constants.
     assert sizes(100) == sizes(400)
-    assert sizes(1201) == sizes(2400)
+    assert sizes(2100) == sizes(4200)
 
 
 def test_every_row_and_unknown_has_a_name():
