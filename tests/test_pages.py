@@ -154,3 +154,10 @@ def test_pictures_of_the_gallery_are_of_moderate_size():
 
 def test_the_front_page_is_short():
     assert len(PAGES["README"].split()) <= 1250
+
+
+def test_every_page_is_in_the_table_of_contents():
+    """If not: add a line to the nav of mkdocs.yml."""
+    nav = (ROOT / "mkdocs.yml").read_text().partition("\nnav:\n")[2]
+    pages = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")}
+    assert not [page for page in pages if f"- {page}\n" not in nav]
