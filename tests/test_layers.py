@@ -24,6 +24,7 @@ LAYERS = [
     ["scene"],
     ["motion"],
     ["guess", "results"],
+    ["ipopt"],
     ["nlp"],
     ["diagnosis"],
     ["solver", "checks"],
@@ -34,6 +35,7 @@ LAYERS = [
     ["studies", "sweeps", "exports", "conversions", "answers", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
+    ["pages"],
     ["notebook"],
     ["cli"],
 ]
