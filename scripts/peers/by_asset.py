@@ -100,5 +100,7 @@ def _answer(task: Task, method: str, found: np.ndarray, done: str) -> Answer:
     last = found[-1:, : len(task.first)]
     end = (in_plane(last) if task.polar else last)[0, : task.axes]
     objective = found[-1, 0 if task.thrust else size - 1]
-    mesh = times[:: degree]
-    return Answer(float(objective), mesh, times[places], controls[places], end, status=done.split(".")[-1].lower())
+    mesh = times[::degree]
+    return Answer(
+        float(objective), mesh, times[places], controls[places], end, status=done.split(".")[-1].lower()
+    )

@@ -88,7 +88,9 @@ def solve(task: Task, method: str, *steps: int) -> Answer:
     """One solve from the statement, on so many equal steps, and again on finer ones from what was found."""
     found = None
     for count in steps:
-        found = plain(task, count, found) if method == "(16)" else collocated(task, RULES[method](), count, found)
+        found = (
+            plain(task, count, found) if method == "(16)" else collocated(task, RULES[method](), count, found)
+        )
     assert found is not None
     last = found.states[:, -1:].T
     end = (in_plane(last) if task.polar else last)[0, : task.axes]
@@ -141,7 +143,9 @@ def collocated(task: Task, rule: Rule, steps: int, coarse: Found | None) -> Foun
 
     rate, t = rates(task), ca.SX.sym("t")
     xs, us = ca.SX.sym("xs", size, count + 1), ca.SX.sym("us", task.controls, len(rule.controls))
-    seen = [rate(t + h * c, xs[:, i], us[:, j]) for j, (c, i) in enumerate(zip(rule.controls, rule.at, strict=True))]
+    seen = [
+        rate(t + h * c, xs[:, i], us[:, j]) for j, (c, i) in enumerate(zip(rule.controls, rule.at, strict=True))
+    ]
     change, cost = (ca.horzcat(*parts) for parts in zip(*seen, strict=True))
     defects = ca.mtimes(xs, rule.rows.T) - h * ca.mtimes(change, rule.slopes.T)
     step = ca.Function("step", [t, xs, us], [ca.vec(defects), h * ca.mtimes(cost, rule.weights)])

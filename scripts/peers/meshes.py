@@ -27,7 +27,13 @@ MESHES: dict[str, dict[str, list[tuple]]] = {
             ("Hermite-Simpson", 20, 40, 160),
             ("(16)", 40, 160, 640, 1280),
         ],
-        "P5": [("Hermite-Simpson", 50), ("Radau 3", 40), ("Legendre 4", 40), ("Legendre 6", 16), ("Legendre 6", 24)],
+        "P5": [
+            ("Hermite-Simpson", 50),
+            ("Radau 3", 40),
+            ("Legendre 4", 40),
+            ("Legendre 6", 16),
+            ("Legendre 6", 24),
+        ],
     },
     # order and number of steps; or neither, and a tolerance
     "dmoc": {

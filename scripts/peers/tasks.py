@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+
 @dataclass(frozen=True)
 class Task:
     """A transfer in plain numbers.
@@ -158,7 +159,7 @@ TASKS = {
 
 
 def guess(task: Task, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States and controls of the path that all start from as the peers have them, a row a fraction of the time."""
+    """States and controls of the path that all start from, as the peers have them, a row a fraction."""
     return _spiral(task, fractions) if task.polar else _from_rest_to_rest(task, fractions)
 
 

@@ -49,7 +49,8 @@ class Run:
 
     def facts(self) -> dict[str, Any]:
         """For JSON, times in [s]."""
-        known = {"tool": self.tool, "problem": self.task, "mesh": list(self.mesh), "error": self.error}
+        known = {"tool": self.tool, "problem": self.task, "mesh": list(self.mesh)}
+        known |= {"error": self.error, "status": self.status}
         return known | {"first": median(self.first), "warm": median(self.warm), "runs": len(self.first)}
 
 
@@ -77,7 +78,7 @@ class Bench:
         return seen.stdout.strip()
 
     def once(self, tool: str, task: str, mesh: tuple, again: int) -> tuple[list[float], Answer] | None:
-        """Times of the solves of one new process [s] and the last answer; None if it fails or takes too long."""
+        """Times of the solves of a new process [s] and the last answer; None if it fails or takes too long."""
         words = [self.pythons[tool], "-m", "peers.worker", tool, task, json.dumps(mesh), str(again)]
         paths = os.pathsep.join([str(SCRIPTS), str(SCRIPTS.parent)])
         try:
@@ -98,7 +99,7 @@ class Bench:
         return found["seconds"], Answer.of(found["answer"])
 
     def tried(self, tool: str, task: str) -> list[tuple[float, Run]]:
-        """Meshes of the short list up to the best accuracy, with the time of a warm solve [s], not for the table."""
+        """Meshes of the short list up to the best accuracy, with the time of one warm solve [s]."""
         runs: list[tuple[float, Run]] = []
         for mesh in MESHES[tool][task]:
             if any(run.error <= ACCURACIES[-1] for _, run in runs):
@@ -113,7 +114,7 @@ class Bench:
         """The times of runs, which take turns, so that whatever else the computer does falls on all alike."""
         for turn in range(repeats):
             for run in runs:
-                if turn >= LEAST and median(run.first) > SLOW:
+                if turn >= LEAST and run.first and median(run.first) > SLOW:
                     continue
                 again = 1 if run.first and run.first[-1] > BRIEF else WARM
                 if (found := self.once(run.tool, run.task, run.mesh, again)) is not None:

@@ -1,4 +1,4 @@
-"""The problems on which scripts/peers compares tools are those of the gallery, and its table says what was run."""
+"""The problems on which scripts/peers compares tools are those of the gallery; its table says what was run."""
 
 import math
 import sys
@@ -27,7 +27,9 @@ def test_a_task_is_the_problem_of_the_gallery(name):
     for part in ("mass", "duration", "actuator", "objective", "constraints", "effects"):
         assert getattr(stated, part) == getattr(ours, part), part
     for end in ("start", "goal"):
-        np.testing.assert_allclose(*[np.concatenate(getattr(one, end).fixed()) for one in (stated, ours)], atol=1e-15)
+        np.testing.assert_allclose(
+            *[np.concatenate(getattr(one, end).fixed()) for one in (stated, ours)], atol=1e-15
+        )
 
 
 def test_the_condition_of_the_largest_radius_is_that_of_the_gallery():
@@ -58,7 +60,7 @@ def test_by_hand_and_by_dmoc_come_to_the_same(name):
 
 
 def test_the_error_is_that_of_the_control_flown():
-    """A control that is off by a hundredth misses the goal by as much of what it does, though it claims no error."""
+    """A control that is off by a hundredth misses the goal, whatever it claims."""
     task = TASKS["P3"]
     answer = by_casadi.solve(task, "Legendre 4", 6)
     wrong = Answer.of({**answer.plain(), "controls": (1.01 * answer.controls).tolist()})
