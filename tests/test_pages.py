@@ -30,11 +30,11 @@ FIRST = ("README: Two commands", "README: A scene in ten lines")
 
 
 # Some sections need a package that comes with an extra; whoever runs the tests without has none of it.
-NEEDED = {"report": "plotly"}
+NEEDED = {"report": "plotly", "effects: The air of a date": "pymsis"}
 
 
 def of_section(name):
-    package = NEEDED.get(name.partition(":")[0])
+    package = NEEDED.get(name) or NEEDED.get(name.partition(":")[0])
     missing = package is not None and find_spec(package) is None
     return pytest.param(name, marks=pytest.mark.skipif(missing, reason=f"{package} is not installed"))
 

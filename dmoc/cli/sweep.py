@@ -60,6 +60,10 @@ def sweep(
         bool,
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
+    keep: Annotated[
+        str | None,
+        typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
+    ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")
     ] = None,
@@ -91,6 +95,7 @@ def sweep(
             out,
             settings=parse_settings(settings or ()),
             follow=follow,
+            keep=keep,
             workers=workers,
             scheduler=scheduler,
             restart=restart,
