@@ -50,8 +50,10 @@ USAGE_ERROR: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
-    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
-    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed, 130 interrupted.",
+    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time. "
+    "Begin with: dmoc solve free_flyer",
+    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed or a tolerance was missed, "
+    "130 interrupted.",
 )
 
 
@@ -119,7 +121,7 @@ def show(name: Name, settings: Settings = None) -> None:
     console.print(f"{file.path}; solve it with: dmoc solve {name}")
 
 
-app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")(
+app.command(epilog="Example: dmoc solve free_flyer --set mass=12 --tol 1e-4 --out flight.nc --plot flight.png")(
     solve_command.solve
 )
 

@@ -33,7 +33,7 @@ from dmoc.cli.pages import Dark, draw, drawable, guess_from
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
 Compiled = Annotated[
-    bool, switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept.")
+    bool, switch("--compiled", help="Evaluate machine code; needs a C compiler the first time.")
 ]
 
 
@@ -42,7 +42,7 @@ def solve(
     order: Order = None,
     steps: Steps = None,
     tol: Annotated[
-        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
+        float | None, typer.Option(help="Relative error to reach, such as 1e-4; sets order and steps.")
     ] = None,
     hold: Hold = False,
     settings: Settings = None,
@@ -53,20 +53,17 @@ def solve(
     dark: Dark = False,
     animate: Annotated[Path | None, typer.Option(help="Write a moving picture here (gif or mp4).")] = None,
     guess: Annotated[
-        Path | None,
-        typer.Option(help="A saved solution to start from, or a point of a sweep: map.nc:duration=12."),
+        Path | None, typer.Option(help="Start from this saved solution, or a point of a sweep: map.nc:7.")
     ] = None,
     starts: Annotated[
         int,
-        typer.Option(
-            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
-        ),
+        typer.Option(metavar="N", min=1, max=1000, help="Starting paths to try coarsely; the best is refined."),
     ] = 1,
     structure: Structure = None,
     impulses: Impulses = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
+        typer.Option(metavar="S", help="End after so many seconds with the best answer so far."),
     ] = None,
     as_json: Json = False,
     compiled: Compiled = False,

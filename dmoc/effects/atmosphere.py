@@ -19,7 +19,9 @@ SPEED_FLOOR = 1e-6
 
 @dataclass(frozen=True)
 class Wind(Part):
-    """The velocity of the air over the ground.
+    """The velocity of the air over the ground, for the argument `wind` of an atmosphere.
+
+    `Drag(area, drag_coefficient, UniformAtmosphere(1.2, wind=Wind((-3, 0))))` is a drag with a wind.
 
     Parameters
     ----------
