@@ -48,6 +48,21 @@ def ways_of(problem: Any, span: tuple[float, float]) -> list[Way]:
     return found
 
 
+def ends_of(solution: Any) -> list[tuple[str, Any, float]]:
+    """Names, boundaries and times [s] of the joints of a mission, or of the starts and goals of a team."""
+    first, last = solution.time[0], solution.time[-1]
+    joints = getattr(solution.problem, "joints", None)
+    if joints is None:
+        ends = zip(solution.problem.names, solution.problem.stretches, strict=True)
+        return [
+            (f"{side} of {name}", getattr(one, side), time)
+            for name, one in ends
+            for side, time in (("start", first), ("goal", last))
+        ]
+    times = [*(leg.provenance.start_time for leg in solution.legs), last]
+    return [(joint.name, joint.boundary, time) for joint, time in zip(joints, times, strict=True)]
+
+
 def orbit_of(mu: float, position: np.ndarray, velocity: np.ndarray) -> np.ndarray | None:
     """Points of the orbit of a state around a point mass at the origin [m]; None where it is not closed."""
     distance = float(np.linalg.norm(position))

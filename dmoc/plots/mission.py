@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.answers.ways import ends_of
 from dmoc.plots.lanes import lanes_of, looks_of
 from dmoc.plots.path import (
     ARROWS,
@@ -87,25 +88,10 @@ def scenery(solution: MissionSolution) -> Any:
             effects=effects,
             constraints=_once(one for leg in stretches for one in leg.constraints),
             attraction=Attraction.of(effects, solution.dimension),
-            ends=_ends(solution),
+            ends=ends_of(solution),
         )
     known = {name: getattr(solution, name) for name in ("dimension", "position", "time")}
     return SimpleNamespace(problem=around, **known)
-
-
-def _ends(solution: Any) -> list[tuple[str, Any, float]]:
-    """Names, boundaries and times [s] of the joints of a mission, or of the starts and goals of a team."""
-    first, last = solution.time[0], solution.time[-1]
-    joints = getattr(solution.problem, "joints", None)
-    if joints is None:
-        ends = zip(solution.problem.names, solution.problem.stretches, strict=True)
-        return [
-            (f"{side} of {name}", getattr(one, side), time)
-            for name, one in ends
-            for side, time in (("start", first), ("goal", last))
-        ]
-    times = [*(leg.provenance.start_time for leg in solution.legs), last]
-    return [(joint.name, joint.boundary, time) for joint, time in zip(joints, times, strict=True)]
 
 
 def _once(parts: Any) -> list[Any]:
