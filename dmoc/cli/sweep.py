@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     from dmoc.sweeps.loop import SweepProgress
 
 
+Keep = Annotated[
+    str | None,
+    typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
+]
+
+
 def sweep(
     problem: Name,
     vary: Annotated[
@@ -61,10 +67,7 @@ def sweep(
         bool,
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
-    keep: Annotated[
-        str | None,
-        typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
-    ] = None,
+    keep: Keep = None,
     workers: Annotated[
         int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")
     ] = None,
