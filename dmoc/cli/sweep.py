@@ -40,6 +40,8 @@ Keep = Annotated[
     typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
 ]
 
+Workers = Annotated[int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")]
+
 
 def sweep(
     problem: Name,
@@ -68,9 +70,7 @@ def sweep(
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
     keep: Keep = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")
-    ] = None,
+    workers: Workers = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
     ] = None,
