@@ -10,9 +10,11 @@ import numpy as np
 
 from dmoc.effects.base import Attractor
 from dmoc.ends.base import Boundary
-from dmoc.guess.coast import coast
+from dmoc.guess.coast import coast, controls_for, two_impulses, with_mass
 from dmoc.guess.spiral import MOST_BENT, Spiral
 from dmoc.guess.winding import Winding
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
 
@@ -27,6 +29,12 @@ NEARLY_ROUND = 0.3
 # An orbit is not changed evenly into another if the cosine of the angle between their angular momenta is below
 # this [-]: their bodies turn in nearly opposite senses.
 OPPOSITE = -0.9
+# A burn is short if it takes less than this part of the time between the two [-]: a longer one is far from an
+# impulse.
+SHORT_BURN = 0.7
+# A path of two burns is a good start if it takes no more than this many times the velocity change of an even
+# change of the orbit [-]: one that turns the plane, or that is not round, takes more.
+NO_DEARER = 1.1
 # So many revolutions more are tried where another number of them may be better.
 OTHER_TURNS = (1, -1, 2, -2)
 
@@ -113,6 +121,36 @@ def with_more_turns(problem: TransferProblem, base: DiscretePath, turns: int) ->
     windings = windings_between(problem, base.duration, ends, turns)
     turned = center + turned_around(base.position - center, turns * base.fractions)
     return replace(base, position=windings[0][0](base.fractions) if windings else turned)
+
+
+def two_burns(problem: TransferProblem, first: DiscretePath) -> DiscretePath | None:
+    """A path of two burns of full thrust on the mesh of another one; None where they would be long or dear."""
+    limit, duration = problem.actuator.force_limit() or 0.0, first.duration
+    if problem.size > problem.dimension or np.isnan(problem.start.fixed()).any() or problem.goal.anchored:
+        return None
+    found = two_impulses(problem, duration)
+    if found is None:
+        return None
+    sizes = np.linalg.norm(found.changes, axis=1)
+    lengths, between = problem.mass * sizes / limit, np.diff(found.times)[0]
+    even = velocity_change_between(problem, end_estimates(problem, duration))
+    if not 0 < lengths.min() < lengths.max() < SHORT_BURN * between or sizes.sum() > NO_DEARER * even:
+        return None
+    begins, ends = found.times - 0.5 * lengths, found.times + 0.5 * lengths
+    if begins[0] < 0:
+        return None
+    weights = np.diff(first.mesh) if first.hold else node_weights(first.mesh, scheme(first.order))
+    edges = duration * np.append(0.0, np.cumsum(weights))
+    # Each control has the part of its share of the time in which there is thrust.
+    covered = np.minimum(edges[1:, None], ends) - np.maximum(edges[:-1, None], begins)
+    force = (np.maximum(covered, 0.0) / np.diff(edges)[:, None] * limit / sizes) @ found.changes
+    states = found.states(duration * first.fractions)
+    control = controls_for(problem, force)
+    if control is None:
+        return None
+    position, velocity = np.hsplit(states, 2)
+    path = replace(first, start_velocity=velocity[0], goal_velocity=velocity[-1])
+    return with_mass(problem, replace(path, position=position, control=control))
 
 
 def change_without_phase(problem: TransferProblem, states: Any) -> float | None:

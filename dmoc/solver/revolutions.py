@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import lasting
-from dmoc.guess.coast import MANY_TURNS
+from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates
-from dmoc.guess.starting import controls_for, guess_duration, starting_guess
+from dmoc.guess.starting import guess_duration, starting_guess
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -169,20 +168,10 @@ def promise(problem: TransferProblem, rung: Rung) -> Sounding:
     if control is None:
         control = np.zeros((len(path.control), problem.controls))
         return Sounding(replace(path, control=control), excess, effort, problem.free_duration, effort)
-    flown = _with_mass(problem, replace(path, control=control))
+    flown = with_mass(problem, replace(path, control=control))
     cost = problem.objective.sense * cost_along(problem, flown)
     paid = cost_along(problem, replace(path, control=0 * control)) != cost_along(problem, flown)
     pinned = problem.free_duration and paid
     most = np.inf if limit is None else limit
     within = control * min(1.0, most / np.linalg.norm(path.control, axis=1).max(initial=0.0))
     return Sounding(replace(path, control=within), excess, cost, pinned, effort)
-
-
-def _with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
-    """The path with the mass that its controls leave, at least half of it."""
-    if not problem.actuator.burns:
-        return path
-    u = ca.SX.sym("u", problem.controls)
-    flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
-    burnt = path.duration * np.cumsum(node_weights(path.mesh, scheme(path.order)) * flow)
-    return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))

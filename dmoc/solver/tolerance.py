@@ -21,7 +21,7 @@ from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
-from dmoc.solver.rung import OFF_OPTIMUM, Rung, at_rest
+from dmoc.solver.rung import Rung, at_rest, off_optimum
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
@@ -79,7 +79,7 @@ def climb_to_tolerance(
     the change there tells the error.
     """
     first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
-    trial = flat_optimum(ladder, first)
+    trial = flat_optimum(ladder, first, tol)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
     if guess is None:
@@ -113,7 +113,7 @@ class _Refinement:
 
     def __init__(self, ladder: Ladder, tol: float, local: bool, reason: str):
         self.ladder, self.problem, self.tol = ladder, ladder.problem, tol
-        self.local, self.reason = local, reason
+        self.local, self.reason, self.off = local, reason, off_optimum(tol)
         self.changes: list[tuple[float, float]] = []
         self.errors: dict[int, float] = {}
         self.best: _Found | None = None
@@ -133,8 +133,8 @@ class _Refinement:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
-            if not self.changes and rung.pull > OFF_OPTIMUM:
-                rung = at_rest(self.ladder.try_on, rung, self.lean)
+            if not self.changes and rung.pull > self.off:
+                rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)
             fine = rung.path
             self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
             self._hold_if_flat(rung)
@@ -142,10 +142,10 @@ class _Refinement:
                 self.flat = True
                 self.reason += "; durations cost the same, one was kept"
             met = self._judge(rung, fine, most)
-            if met and rung.pull > OFF_OPTIMUM:
+            if met and rung.pull > self.off:
                 rung = self._released(rung)
-                self.best = None if rung.pull <= OFF_OPTIMUM else self.best
-                met = self._judge(rung, rung.path, most) and rung.pull <= OFF_OPTIMUM
+                self.best = None if rung.pull <= self.off else self.best
+                met = self._judge(rung, rung.path, most) and rung.pull <= self.off
             if met:
                 self._sharpen(rung, most)
             if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
@@ -206,7 +206,7 @@ class _Refinement:
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        if (found := at_rest(self.ladder.try_on, rung, self.lean)) is rung:
+        if (found := at_rest(self.ladder.try_on, rung, self.lean, self.tol)) is rung:
             return rung
         before, after = ((one.path, one.level.objective) for one in (rung, found))
         moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))
