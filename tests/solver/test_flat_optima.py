@@ -245,3 +245,23 @@ def test_a_flat_optimum_is_let_go_before_the_last_mesh():
     change = abs(np.sqrt(2 * radius / (1 + radius)) - 1) + abs(1 - np.sqrt(2 / (1 + radius))) / np.sqrt(radius)
     assert solution.objective == pytest.approx(1 - np.exp(-change / exhaust), rel=1e-4)
     assert solution.iterations < 600 and verify(solution).ok
+
+
+def test_nozzles_that_cancel_leave_the_check_of_optimality_a_unit_of_cost():
+    """All nozzles at once, held weaker than is typical, made an effort of 2e-8 of one: that was the unit."""
+    away = TransferProblem(
+        1.1784004729244795,
+        State(
+            (-0.6939588275072724, -0.12840029909412712, -0.7084733650020094),
+            (-0.18193774567831508, 0.9833100511524799, 0.0),
+        ),
+        State(
+            (0.15014477873795257, 0.7921989579771114, 0.3580244420446077),
+            (0.7379538593451797, -0.4304077361850586, 0.689269558674312),
+        ),
+        7.8843270934115,
+        effects=[PointGravity(1.0)],
+        actuator=Nozzles([*np.eye(3), *-np.eye(3)], 0.08006068239482939),
+    )
+    solution = solve(away, order=6, hold=True).raise_for_status()
+    assert {check.name: check.ok for check in verify(solution).checks}["optimality"]
