@@ -15,7 +15,9 @@ LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
 FORMULA = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # A row of the gallery: name, picture and what the problem is.
 ROW = re.compile(r"^\| \[(\w+)\]\((\S+\.png)\) \| ([^|]+) \|", re.MULTILINE)
-FIGURE = '<figure><a href="{1}"><img src="{1}" alt="{0}" loading="lazy"></a><figcaption>{0}</figcaption></figure>'
+FIGURE = (
+    '<figure><a href="{1}"><img src="{1}" alt="{0}" loading="lazy"></a><figcaption>{0}</figcaption></figure>'
+)
 
 
 def target(link, source):

@@ -65,14 +65,17 @@ Source = Annotated[
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem, such as mass=12; repeat for more."),
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="A parameter of the problem, such as mass=12; repeat for more."
+    ),
 ]
 Order = Annotated[
     int | None,
     typer.Option(help="Order of the scheme: 2, 4, 6 or 8; if not given, the default of the scene."),
 ]
 Steps = Annotated[
-    int | None, typer.Option(help="Number of steps, at least 2; if not given 400, 100, 50 or 32 at order 2, 4, 6 or 8.")
+    int | None,
+    typer.Option(help="Number of steps, at least 2; if not given 400, 100, 50 or 32 at order 2, 4, 6 or 8."),
 ]
 Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
 Structure = Annotated[
@@ -84,11 +87,17 @@ Structure = Annotated[
     ),
 ]
 Impulses = Annotated[
-    str | None, typer.Option(metavar="auto", help="Find how many impulses of a mission cost least, beginning with those it has.")
+    str | None,
+    typer.Option(
+        metavar="auto", help="Find how many impulses of a mission cost least, beginning with those it has."
+    ),
 ]
 Worth = Annotated[
     bool,
-    switch("--worth", help="Also say what each number of the problem is worth: the derivative of the objective by it."),
+    switch(
+        "--worth",
+        help="Also say what each number of the problem is worth: the derivative of the objective by it.",
+    ),
 ]
 Hold = Annotated[bool, switch("--hold", help="Keep forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]

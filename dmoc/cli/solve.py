@@ -42,7 +42,8 @@ def solve(
     order: Order = None,
     steps: Steps = None,
     tol: Annotated[
-        float | None, typer.Option(help="Relative error to reach, such as 1e-4; order and steps follow from it.")
+        float | None,
+        typer.Option(help="Relative error to reach, such as 1e-4; order and steps follow from it."),
     ] = None,
     hold: Hold = False,
     settings: Settings = None,
@@ -56,7 +57,10 @@ def solve(
     starts: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=1000, help="Try so many starting paths on a coarse mesh and refine the best optimum."
+            metavar="N",
+            min=1,
+            max=1000,
+            help="Try so many starting paths on a coarse mesh and refine the best optimum.",
         ),
     ] = 1,
     structure: Structure = None,

@@ -47,7 +47,8 @@ def sweep(
     ],
     out: Annotated[Path, typer.Option(help="Where to write the results (netCDF).")],
     sample: Annotated[
-        int | None, typer.Option(metavar="N", help="Solve so many points spread over the ranges instead of a grid.")
+        int | None,
+        typer.Option(metavar="N", help="Solve so many points spread over the ranges instead of a grid."),
     ] = None,
     method: Annotated[str, typer.Option(help="How a sample is spread: sobol or latin.")] = "sobol",
     seed: Annotated[int, typer.Option(help="The same seed gives the same sample.")] = 0,

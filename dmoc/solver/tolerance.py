@@ -40,8 +40,7 @@ MOST_SHARPENING = 200
 LEAST_ROUNDING = 1e-8
 # The times of switches are listed only if there are no more than this many: a message must stay short.
 MOST_SWITCHES = 12
-# Durations are equally good if, to first order, a change by this part of the duration costs no more than the
-# tolerance.
+# Durations are equally good if a change by this part of them costs, to first order, at most the tolerance [-].
 EQUALLY_GOOD = 0.1
 # Where the cost is linear in controls and its optimum flat, an answer is held near that on the mesh before, by
 # so many times the tolerance [-]: seven flat optima then met tolerances that none had met.
@@ -53,17 +52,17 @@ SAME_COST = 0.3
 # Where the cost changes more than the path, and that falls by less than this factor from mesh to mesh [-],
 # all steps are cut, and not those alone that make the error of the path.
 SLOW = 2.0
-# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-]:
-# elsewhere both change alike.
+# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-].
 FLAT = 0.03
+# Costs below this part of the unit of cost are nothing [-]: a target may be met by a coast alone.
+NOTHING = 1e-3
 # A refinement of more iterations than this wanders: others take 20 to 90.
 LONG = 100
 # A refinement that is not held ends after this many iterations: then it is tried anew, and held.
 LONGEST_FREE = 150
 # A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
 TIGHTER = 10.0
-# A mesh does no better if its change is more than this part of the one before [-]: the error that is estimated
-# from the fall of changes goes up and down.
+# A mesh does no better if its change is more than this part of the one before [-].
 FALLING = 0.95
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
@@ -136,7 +135,10 @@ class _Refinement:
             if not self.changes and rung.pull > self.off:
                 rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)
             fine = rung.path
-            self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
+            least = NOTHING * rung.nlp.units.cost
+            self.changes.append(
+                change(self.problem, (coarse, cost), (fine, rung.level.objective), parts, least)
+            )
             self._hold_if_flat(rung)
             if rung.pinned and not self.flat:
                 self.flat = True

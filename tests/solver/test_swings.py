@@ -126,3 +126,17 @@ def test_swings_of_a_spring_and_of_a_goal_are_counted_in_their_time():
     assert swings(SCENES["spring"][2]) == pytest.approx(1 / (2 * np.pi))
     # Turning points are half a swing apart, and no more than one is lost at the ends.
     assert swings(SCENES["swinging goal"][2]) == pytest.approx(1.3 / (2 * np.pi), abs=0.5 / 13.5)
+
+
+def test_a_coast_that_costs_nothing_meets_a_tolerance():
+    """After half a swing the body is where it is wanted; changes of an effort of 1e-31 are no errors."""
+    half = TransferProblem(
+        1.0,
+        State((1.0,), (0.0,)),
+        State((-1.0,), (0.0,)),
+        (1.0, 12.0),
+        effects=[Spring(1.0, (0.0,))],
+        actuator=BallForce(2.0),
+    )
+    solution = solve(half, tol=1e-5, order=8).raise_for_status()
+    assert solution.objective < 1e-20 and len(solution.ladder) < 30
