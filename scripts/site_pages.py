@@ -1,4 +1,4 @@
-"""What MkDocs does besides docs/: README.md becomes the home page, notebooks become pages, linked files go along."""
+"""What MkDocs does besides docs/: README.md is the home page, notebooks are pages, linked files go along."""
 
 import json
 import posixpath
@@ -80,5 +80,6 @@ def on_page_markdown(markdown, page, config, files):
     markdown = FORMULA.sub(formula, LINK.sub(led, markdown))
     if here == "gallery.md":
         figures = "\n".join(FIGURE.format(name, picture) for name, picture, _ in ROW.findall(markdown))
-        markdown += f'\n## Pictures\n\n<div class="pictures">\n{figures}\n</div>\n'
+        before, head, rows = markdown.partition("| problem |")
+        markdown = f'{before}<div class="pictures">\n{figures}\n</div>\n\n{head}{rows}'
     return markdown
