@@ -135,10 +135,8 @@ class _Refinement:
             if not self.changes and rung.pull > self.off:
                 rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)
             fine = rung.path
-            least = NOTHING * rung.nlp.units.cost
-            self.changes.append(
-                change(self.problem, (coarse, cost), (fine, rung.level.objective), parts, least)
-            )
+            now, least = (fine, rung.level.objective), NOTHING * rung.nlp.units.cost
+            self.changes.append(change(self.problem, (coarse, cost), now, parts, least))
             self._hold_if_flat(rung)
             if rung.pinned and not self.flat:
                 self.flat = True
