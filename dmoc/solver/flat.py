@@ -70,8 +70,7 @@ def flat_optimum(ladder: Ladder, first: DiscretePath, tolerance: float | None = 
 def held_near_two_burns(ladder: Ladder, first: DiscretePath) -> Rung | None:
     """An answer on the mesh of a guess that is held near a path of two short burns, or None.
 
-    The path of least effort has thrust all along, and least fuel has many burns near it, none of them the best:
-    from there to few burns it is a long way, on which most attempts lead nowhere.
+    From the path of least effort, with thrust all along, most attempts lead nowhere on the long way to few burns.
     """
     if not _may_be_flat(ladder.problem) or first.multipliers:
         return None

@@ -113,11 +113,9 @@ def _valleys(soundings: list[Sounding]) -> list[Sounding]:
         near = soundings[max(i - 1, 0) : i + 2]
         if any((other.excess, other.cost) < (one.excess, one.cost) for other in near):
             continue
-        cost = one.cost
+        cost, after = one.cost, [other.path.duration - one.path.duration for other in near]
         if len(near) == 3 and not any(other.excess for other in near):
-            bend, slope, _ = np.polyfit(
-                [other.path.duration - one.path.duration for other in near], [other.cost for other in near], 2
-            )
+            bend, slope, _ = np.polyfit(after, [other.cost for other in near], 2)
             cost -= 0.5 * slope**2 / bend if bend > 0 else 0.0
         found.append(replace(one, cost=cost, pinned=False))
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,11 @@ from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
+from dmoc.ipopt.run import Answer
 from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
-from dmoc.results.facts import Level, optimality_limit
+from dmoc.results.facts import Level, off_optimum
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.clock import cautions_of
@@ -25,9 +26,6 @@ from dmoc.scene.problem import TransferProblem
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
 WORTH_TELLING = 1e-5
-# An answer that was held near its guess is an optimum if it is off one by less than this part of what the check
-# called optimality allows [-].
-OFF_OPTIMUM = 0.5
 # Where many paths cost the same an answer is held near its guess as strongly as this or, where that leads
 # nowhere, as the next [-].
 HELD = (1e-2, 1e-3)
@@ -71,7 +69,7 @@ class Rung:
         """Whether the user ended it."""
         return self.answer.status == "stopped"
 
-    @property
+    @cached_property
     def path(self) -> DiscretePath:
         """The path of the answer, with its multipliers."""
         return self.nlp.path(self.problem, self.answer)
@@ -124,11 +122,6 @@ def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: Di
         if rung.solved:
             return let_go(try_on, rung, lean)
     return None
-
-
-def off_optimum(tolerance: float | None = None) -> float:
-    """By how much an answer to a tolerance, or to none, may be pulled off its optimum [-]."""
-    return OFF_OPTIMUM * optimality_limit(tolerance)
 
 
 def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float, tolerance: float | None = None) -> Rung | None:
