@@ -70,7 +70,7 @@ def flat_optimum(ladder: Ladder, first: DiscretePath, tolerance: float | None = 
 def held_near_two_burns(ladder: Ladder, first: DiscretePath) -> Rung | None:
     """An answer on the mesh of a guess that is held near a path of two short burns, or None.
 
-    From the path of least effort, with thrust all along, most attempts lead nowhere on the long way to few burns.
+    From the path of least effort, with thrust all along, most attempts lead nowhere on the way to few burns.
     """
     if not _may_be_flat(ladder.problem) or first.multipliers:
         return None
