@@ -21,6 +21,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from dmoc.basics.unknown import Unknown
+
 # At most this many functions are remembered; the ones used longest ago go first.
 MOST = 500
 # A table of more rows is long: a key holds its digest, not all of it.
@@ -129,7 +131,7 @@ def identity(value: Any) -> Hashable:
     kind = type(value)
     if kind in (type(None), bool, int, str):
         return kind, value
-    if kind is float:
+    if kind is float or kind is Unknown:
         return kind, value.hex()
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.shape, value.dtype.str, value.tobytes()

@@ -271,7 +271,18 @@ def point_function(
             push = push if acts is None else push + acts / m
     moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
     change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
-    return ca.Function("point", [t, q, v, m], [*change, configuration.shared(push, m)])
+    outputs = [*change, configuration.shared(push, m)]
+    # Numbers that are unknown stay symbols; such a function serves as a part of formulas alone.
+    return ca.Function("point", [t, q, v, m], outputs, {"allow_free": bool(symbols_in(effects))})
+
+
+def symbols_in(parts: Any) -> list[ca.SX]:
+    """The symbols that stand for unknown numbers in effects, and in parts of them."""
+    if isinstance(parts, ca.SX):
+        return [parts]
+    if isinstance(parts, tuple):
+        return [symbol for part in parts for symbol in symbols_in(part)]
+    return symbols_in(tuple(vars(parts).values())) if hasattr(parts, "adjustable") else []
 
 
 def split_effects(

@@ -59,8 +59,7 @@ class _Writer:
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool):
         self.problem, self.rule, self.hold, self.curved = problem, rule, hold, curved
         self.joined = joined
-        self.dynamics = Dynamics.of(problem)
-        self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
+        self.origin, self.start_time = ca.SX.sym("origin", problem.size), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
         head = [self.origin, self.start_time, self.mass]
         if not problem.free_duration:
@@ -68,7 +67,10 @@ class _Writer:
             head.append(self.duration)
         twins = [with_symbols(part, f"part_{i}") for i, part in enumerate(problem.adjustable_parts)]
         self.parameters = ca.vertcat(*head, *[symbol for _, symbols in twins for symbol in symbols])
-        self.actuator, self.objective, self.start, self.goal, *self.constraints = [twin for twin, _ in twins]
+        self.actuator, self.objective, self.start, self.goal, *others = [twin for twin, _ in twins]
+        self.constraints, unknown = others[: len(problem.constraints)], iter(others[len(problem.constraints) :])
+        self.effects = tuple(next(unknown) if one.adjustable else one for one in problem.effects)
+        self.dynamics = Dynamics.of(problem, self.effects)
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
@@ -79,7 +81,7 @@ class _Writer:
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = draft.clock() + fraction * duration, r + self.origin
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
-        resting, _ = split_effects(self.problem.effects, body)
+        resting, _ = split_effects(self.effects, body)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
         push = push if u is None else push + body.driven(self.actuator, q, u, m)
         if body.conditions:
@@ -119,7 +121,7 @@ class _Writer:
             body.driven(self.actuator, place + self.origin, u[0], mass) if self.hold else 0
             for place, mass in zip(r, m, strict=True)
         ]
-        moving = self.dynamics.step_point(rule.degree, split_effects(problem.effects, body)[1])
+        moving = self.dynamics.step_point(rule.degree, split_effects(self.effects, body)[1])
         t0 = draft.clock() + begin * duration
 
         def point(t, r, v, m):

@@ -168,7 +168,8 @@ class TransferProblem:
     def adjustable_parts(self) -> tuple:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
         # The stencils and the parameter vector of an NLP both follow this order.
-        return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+        unknown = [effect for effect in self.effects if effect.adjustable]
+        return (self.actuator, self.objective, self.start, self.goal, *self.constraints, *unknown)
 
     @property
     def inertias(self) -> list[Any]:
