@@ -71,10 +71,11 @@ def is_number(value: Any) -> bool:
 
 
 def numeric_fields(part: Any) -> Iterator[str]:
-    """The fields of a part that hold numbers; those of a part in it with a point between: `air.density`."""
+    """The fields of a part that hold numbers or rows of them; those of a part in it as `air.density`."""
     for one in fields(part) if is_dataclass(part) else ():
         value = getattr(part, one.name)
-        if is_number(value):
+        rows = type(value) is tuple and bool(value) and all(type(row) is tuple and is_number(row) for row in value)
+        if rows or is_number(value):
             yield one.name
         elif hasattr(value, "adjustable"):
             yield from (f"{one.name}.{inner}" for inner in numeric_fields(value))
@@ -82,12 +83,16 @@ def numeric_fields(part: Any) -> Iterator[str]:
 
 def open_fields(part: Any) -> tuple[str, ...]:
     """Those of its `numeric_fields` that hold an `Unknown`."""
-    found = ((name, at(part, name)) for name in numeric_fields(part))
-    return tuple(name for name, value in found if any(map(is_unknown, value if type(value) is tuple else (value,))))
+    return tuple(name for name in numeric_fields(part) if has_unknown(at(part, name)))
 
 
 def is_unknown(value: Any) -> bool:
     return isinstance(value, Unknown)
+
+
+def has_unknown(value: Any) -> bool:
+    """Whether a number is unknown, or one of the numbers in a tuple."""
+    return any(map(has_unknown, value)) if isinstance(value, tuple) else is_unknown(value)
 
 
 def at(part: Any, name: str) -> Any:

@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.unknown import with_field
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics, point_function, split_effects
 from dmoc.motion.lobatto import Scheme, scheme
@@ -49,11 +50,11 @@ def stencils_of(
 
 
 def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool) -> Stencils:
-    writer = _Writer(problem, rule, hold, curved, joined)
+    writer = Writer(problem, rule, hold, curved, joined)
     return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
 
 
-class _Writer:
+class Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool):
@@ -70,7 +71,9 @@ class _Writer:
         self.actuator, self.objective, self.start, self.goal, *others = [twin for twin, _ in twins]
         self.constraints, unknown = others[: len(problem.constraints)], iter(others[len(problem.constraints) :])
         self.effects = tuple(next(unknown) if one.adjustable else one for one in problem.effects)
-        self.dynamics = Dynamics.of(problem, self.effects)
+        # After the effects comes an unknown inertia.
+        moving = [with_field(problem, "inertia", part.moments) for part in unknown]
+        self.dynamics = Dynamics.of(*moving or [problem], self.effects)
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""

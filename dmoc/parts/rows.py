@@ -56,4 +56,4 @@ def values_of(part: Any) -> np.ndarray:
 
 
 def _values(part: Any) -> list[np.ndarray]:
-    return [np.atleast_1d(np.asarray(at(part, field), float)) for field in part.adjustable]
+    return [np.ravel(np.asarray(at(part, field), float)) for field in part.adjustable]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from dmoc.basics.unknown import numeric_fields, opened, with_field
+from dmoc.basics.unknown import at, is_number, numeric_fields, opened, with_field
 from dmoc.effects.base import Effect
 from dmoc.motion.dynamics import Dynamics, split_effects
 from dmoc.parts.rows import with_symbols
@@ -37,6 +37,8 @@ def _opened(effects: Sequence[Effect], problem: Any) -> tuple[Effect, ...]:
     for effect in effects:
         names = []
         for name in numeric_fields(effect):
+            if not is_number(at(effect, name)):
+                continue
             try:
                 split_effects([with_symbols(opened(effect, [*names, name]), "probe")[0]], configuration)
             except Exception:
