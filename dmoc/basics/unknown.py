@@ -14,14 +14,14 @@ import numpy as np
 class Unknown(float):
     """A number of a problem that is not known well.
 
-    It is a number like any other, with the value that is thought to be right. `identify` finds it from a flight;
-    in the effects of a problem it is a parameter of the optimisation, which takes another value without a
-    rebuild, has a worth, and is an argument of exported functions. Arithmetic with it gives a plain number.
+    It is a number like any other, with the value that is thought to be right. `identify` finds it from a
+    flight; in the effects of a problem it is a parameter of the optimisation, which takes another value without
+    a rebuild, and an argument of exported functions. Arithmetic with it gives a plain number.
 
     Parameters
     ----------
     value : float or sequence of float
-        What it is thought to be, in the unit of the number it stands for; a sequence becomes a tuple of unknowns.
+        What it is thought to be, in the unit of the number it stands for; of a sequence a tuple of unknowns.
     sigma : float or sequence of float, optional
         Standard deviation of that belief; without it nothing is known but the value to begin with.
 
@@ -42,7 +42,9 @@ class Unknown(float):
         made = super().__new__(cls, _finite("value", value))
         made.sigma = None if sigma is None else _finite("sigma", sigma)
         if made.sigma is not None and made.sigma <= 0:
-            raise ValueError(f"Unknown: sigma must be greater than 0; got {sigma}: leave it out if nothing is known")
+            raise ValueError(
+                f"Unknown: sigma must be greater than 0; got {sigma}: leave it out if nothing is known"
+            )
         return made
 
     def __getnewargs__(self) -> tuple:
@@ -74,7 +76,9 @@ def numeric_fields(part: Any) -> Iterator[str]:
     """The fields of a part that hold numbers or rows of them; those of a part in it as `air.density`."""
     for one in fields(part) if is_dataclass(part) else ():
         value = getattr(part, one.name)
-        rows = type(value) is tuple and bool(value) and all(type(row) is tuple and is_number(row) for row in value)
+        rows = (
+            type(value) is tuple and bool(value) and all(type(row) is tuple and is_number(row) for row in value)
+        )
         if rows or is_number(value):
             yield one.name
         elif hasattr(value, "adjustable"):
@@ -115,6 +119,8 @@ def opened(part: Any, names: Sequence[str]) -> Any:
     """A copy whose fields of these names hold unknowns."""
     for name in names:
         value = at(part, name)
-        unknown = tuple(x if x is None else Unknown(x) for x in value) if type(value) is tuple else Unknown(value)
+        unknown = (
+            tuple(x if x is None else Unknown(x) for x in value) if type(value) is tuple else Unknown(value)
+        )
         part = with_field(part, name, unknown)
     return part

@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from dmoc.cli import disperse as disperse_command
+from dmoc.cli import identify as identify_command
 from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -246,6 +247,10 @@ for _verb, _example in (
     (
         disperse_command.disperse,
         "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
+    (
+        identify_command.identify,
+        "dmoc identify free_flyer --unknown mass=10 --unknown drag=1 --unknown offset --noise 0.001",
     ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),

@@ -1,8 +1,8 @@
 """What every effect is: a frozen dataclass with one method, `lagrangian` or `force`.
 
 `t` is the time [s], `q` the position [m], `v` the velocity [m/s] (CasADi columns of the problem's
-dimension) and `m` the mass [kg]. Constants of an effect are baked into the graph, but for an `Unknown`: that is a
-symbol there.
+dimension) and `m` the mass [kg]. Constants of an effect are baked into the graph, but for an `Unknown`:
+that is a symbol there.
 """
 
 from __future__ import annotations

@@ -34,6 +34,8 @@ PART = 0.1
 DRAWS, LAGS = 200, 10
 # What is less likely than this is told [-].
 UNLIKELY = 0.01
+# Residuals whose squares are below this part of what noise would leave are no noise [-].
+TINY = 1e-2
 
 
 @dataclass(frozen=True, repr=False)
@@ -77,6 +79,11 @@ class Estimate:
     seconds: float
 
     @property
+    def order(self) -> int:
+        """Of the equations between the samples."""
+        return self.fit.system.equations.setting.order
+
+    @property
     def names(self) -> tuple[str, ...]:
         return tuple(one.name for one in self.wanted)
 
@@ -91,11 +98,13 @@ class Estimate:
 
     @property
     def _values(self) -> np.ndarray:
-        return np.array([1 / x if one.inverse else x for one, x in zip(self.wanted, self._unknowns, strict=True)])
+        return np.array(
+            [1 / x if one.inverse else x for one, x in zip(self.wanted, self._unknowns, strict=True)]
+        )
 
     @cached_property
     def _spread(self) -> np.ndarray:
-        """Covariance of the unknowns that stand for the numbers; infinite where the flight does not see them."""
+        """Covariance of the unknowns of the fit; infinite where the flight does not see them."""
         scale = np.array([one.scale for one in self.wanted])
         hidden = self._hidden
         kept = np.flatnonzero(~hidden)
@@ -110,12 +119,18 @@ class Estimate:
     @cached_property
     def _hidden(self) -> np.ndarray:
         """Which numbers take part in a direction that the flight does not see."""
-        return (np.abs(self.fit.unseen) > PART).any(axis=1) if self.fit.unseen.size else np.zeros(len(self.wanted), bool)
+        return (
+            (np.abs(self.fit.unseen) > PART).any(axis=1)
+            if self.fit.unseen.size
+            else np.zeros(len(self.wanted), bool)
+        )
 
     @cached_property
     def covariance(self) -> np.ndarray:
         """Of the numbers in the order of `names` [SI]; infinite or NaN where the flight does not see them."""
-        slopes = np.array([-(v**2) if one.inverse else 1.0 for one, v in zip(self.wanted, self._values, strict=True)])
+        slopes = np.array(
+            [-(v**2) if one.inverse else 1.0 for one, v in zip(self.wanted, self._values, strict=True)]
+        )
         return self._spread * np.outer(slopes, slopes)
 
     @property
@@ -195,7 +210,9 @@ class Estimate:
         for way in self.fit.unseen.T:
             names = [name for name, part in zip(self.names, way, strict=True) if abs(part) > PART]
             if len(names) == 1:
-                said.append(f"{names[0]} is not observable: this flight would be the same with any value of it.")
+                said.append(
+                    f"{names[0]} is not observable: this flight would be the same with any value of it."
+                )
             else:
                 said.append(
                     f"{' and '.join(names)} are not observable: this flight tells a combination of them alone. "
@@ -205,14 +222,18 @@ class Estimate:
             if not np.isfinite(sigma[one.name]):
                 continue
             if one.sigma is not None and sigma[one.name] > BELIEVED * one.sigma:
-                said.append(f"{one.name} is hardly observable: the flight adds next to nothing to what was believed.")
+                said.append(
+                    f"{one.name} is hardly observable: the flight adds next to nothing to what was believed."
+                )
             elif one.kind in ("mass", "scene", "strength") and sigma[one.name] > HARDLY * abs(value):
                 said.append(f"{one.name} is hardly observable: its standard deviation is larger than itself.")
         alike = self.correlation
         for i, first in enumerate(self.names):
             for j in range(i):
                 if abs(alike[i, j]) > ALIKE:
-                    said.append(f"{self.names[j]} and {first} are hardly told apart: correlation {alike[i, j]:.4f}.")
+                    said.append(
+                        f"{self.names[j]} and {first} are hardly told apart: correlation {alike[i, j]:.4f}."
+                    )
         return said
 
     def _on_fit(self) -> list[str]:
@@ -220,13 +241,15 @@ class Estimate:
         if not self.found_noise and self.fitting < UNLIKELY:
             factor = np.sqrt(self.chi_squared / max(self.fit.degrees, 1))
             said.append(
-                f"Residuals are {factor:.3g} times as large as the stated noise: intervals are too narrow. Something "
-                "acts that the scene does not have, or the noise is larger."
+                f"Residuals are {factor:.3g} times as large as the stated noise: intervals are too narrow. "
+                "Something acts that the scene does not have, or the noise is larger."
             )
-        if self.whiteness < UNLIKELY:
+        if self.fit.degrees > 0 and self.chi_squared < TINY * self.fit.degrees:
+            said.append("Residuals are far smaller than the stated noise: intervals are too wide.")
+        elif self.whiteness < UNLIKELY:
             said.append(
-                "Residuals are alike from sample to sample: something acts that the scene does not have, such as an "
-                "effect, a delay or errors of the forces."
+                "Residuals are alike from sample to sample: something acts that the scene does not have, such "
+                "as an effect, a delay or errors of the forces."
             )
         return said
 
@@ -277,7 +300,10 @@ class Estimate:
         found, spans = [], self.interval()
         for one in self.wanted:
             low, high = spans[one.name]
-            found.append((one.name, told(self.values[one.name], (low, high)), span_told(low, high), one.unit or "-"))
+            seen = np.isfinite(self.sigma[one.name])
+            value = told(self.values[one.name], (low, high)) if seen else "?"
+            span = span_told(low, high) if seen else "not observable"
+            found.append((one.name, value, span, one.unit or "-"))
         return found
 
     def __repr__(self) -> str:
@@ -292,7 +318,9 @@ class Estimate:
             "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in line) + "</tr>" for line in self.lines()
         )
         head = "".join(f"<th>{name}</th>" for name in ("number", "value", "95 % interval", "unit"))
-        said = "".join(f"<p>{escape(line)}</p>" for line in (*([] if self.success else [self.message]), *self.remarks))
+        said = "".join(
+            f"<p>{escape(line)}</p>" for line in (*([] if self.success else [self.message]), *self.remarks)
+        )
         return f"<table><tr>{head}</tr>{rows}</table>{said}"
 
 
@@ -306,8 +334,8 @@ def told(value: float, span: Sequence[float]) -> str:
 
 
 def span_told(low: float, high: float) -> str:
-    if np.isnan(low) or np.isnan(high) or not np.isfinite(high - low):
-        return "not observable" if not np.isfinite(low) or low == 0 else f"from {low:.4g} on"
+    if not np.isfinite(high - low):
+        return f"from {low:.4g} on"
     wide = max(high - low, 1e-300)
     digits = min(max(3, int(np.ceil(np.log10(max(abs(low), abs(high), wide) / wide))) + 2), 12)
     return f"{low:.{digits}g} to {high:.{digits}g}"

@@ -19,6 +19,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from dmoc.identification.equations import Equations, layout_nodes
+from dmoc.identification.setting import Setting
 
 # At most so many steps of Newton's method, and so many halvings of one.
 MOST_STEPS, MOST_HALVINGS = 50, 12
@@ -107,7 +108,7 @@ class System:
         return found
 
     def step(self, r: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of the free unknowns and of the numbers, scaled, for residuals and rows, weighted and scaled."""
+        """Changes of free unknowns and of numbers, scaled, for weighted residuals and scaled rows."""
         gradient, split = self.R.T @ r, len(self.free)
         inner = self.solved(-np.concatenate([gradient[:split], c]))
         numbers = self.inverse() @ (-gradient[split:] - self.border.T @ inner)
@@ -126,7 +127,9 @@ class System:
 
     def _spectrum(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Eigenvalues and vectors of the information, each number over what there is of it alone."""
-        size = np.sqrt(np.maximum(np.diag(self.corner) + (self.border * np.abs(self.beyond)).sum(axis=0).clip(0), 0))
+        size = np.sqrt(
+            np.maximum(np.diag(self.corner) + (self.border * np.abs(self.beyond)).sum(axis=0).clip(0), 0)
+        )
         size = np.where(size > 0, size, 1.0)
         alone = np.sqrt(np.maximum(np.diag(self.information), UNSEEN * size**2))
         values, vectors = np.linalg.eigh(self.information / np.outer(alone, alone))
@@ -150,8 +153,8 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
     setting = equations.setting
     free, x = np.flatnonzero(~fixed), setting.begin()
     scale = setting.scales
-    last, converged, steps = np.inf, False, 0
-    for steps in range(1, MOST_STEPS + 1):
+    last, converged = np.inf, False
+    for count in range(1, MOST_STEPS + 1):
         system = System(equations, free, weight, x)
         path, numbers = system.step(system.r, system.c)
         most = _allowed(setting, x, numbers)
@@ -166,6 +169,7 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
             most *= 0.5
         size = float(max(np.abs(path).max(initial=0.0), np.abs(numbers).max(initial=0.0)))
         x = trial
+        steps = count
         if size < SMALL or (size < NEAR and size > 0.3 * last):
             converged = True
             break
@@ -196,11 +200,11 @@ def _merit_at(equations: Equations, x: np.ndarray, weight: float) -> float:
         return _merit(r * weight, c * equations.row_scales)
 
 
-def _allowed(setting: object, x: np.ndarray, numbers: np.ndarray) -> float:
+def _allowed(setting: Setting, x: np.ndarray, numbers: np.ndarray) -> float:
     """The part of a step for which masses stay positive."""
     most = 1.0
-    for j, one in enumerate(setting.wanted):  # type: ignore[attr-defined]
-        now, change = x[setting.numbers[j]], numbers[j] * one.scale  # type: ignore[attr-defined]
+    for j, one in enumerate(setting.wanted):
+        now, change = x[setting.numbers[j]], numbers[j] * one.scale
         if one.inverse and change < 0 and now + change < now / FACTOR:
             most = min(most, (now - now / FACTOR) / -change)
     return most

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -13,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from dmoc.basics.quaternions import normalised, times
 from dmoc.configurations.coordinates import ATTITUDE, PLACE
 from dmoc.configurations.of_problem import configuration_of
-from dmoc.identification.flight import Flight
+from dmoc.flights.flight import Flight
 from dmoc.identification.wanted import Wanted
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions
@@ -143,7 +142,9 @@ def first_path(flight: Flight, problem: TransferProblem, order: int) -> Discrete
     forces = np.zeros((len(mesh) - 1, count)) if flight.forces is None else flight.forces[:-1]
     mass = np.full(len(place), float(problem.mass))
     several = made if len(made.blocks) > 1 or configuration.surplus else None
-    return DiscretePath(mesh, order, True, flight.duration, place, forces, mass, *ends, made_of=several)
+    return DiscretePath(
+        mesh, order, True, flight.duration, place, forces, mass, ends[0], ends[1], made_of=several
+    )
 
 
 def _smooth(times: np.ndarray, given: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

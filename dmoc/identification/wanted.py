@@ -96,7 +96,9 @@ def _effect_changed(place: int, field: str, entry: int | None, problem: Any, val
     if entry is not None:
         before = at(effect, field)
         now = (*before[:entry], now, *before[entry + 1 :])
-    return with_field(problem, "effects", (*effects[:place], with_field(effect, field, now), *effects[place + 1 :]))
+    return with_field(
+        problem, "effects", (*effects[:place], with_field(effect, field, now), *effects[place + 1 :])
+    )
 
 
 def of_inertia(problem: Any, inertia: Any) -> Iterator[Wanted]:

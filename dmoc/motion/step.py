@@ -31,8 +31,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.configurations.acting import kinetic_at_nodes
 from dmoc.configurations.base import Configuration
-from dmoc.motion.dynamics import Dynamics, kinetic_at_nodes
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 
 

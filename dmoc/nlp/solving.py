@@ -160,7 +160,7 @@ class NLP(Program):
         **found: Any,
     ) -> Solution:
         """An answer as a Solution; `found` are further fields of it."""
-        path, dynamics = self.path(problem, answer), replace(self.dynamics, effects=problem.effects)
+        path, dynamics = self.path(problem, answer), replace(self.dynamics, effects=tuple(problem.effects))
         momentum, velocity = end_momenta(dynamics, path, problem.start_time)
         return Solution(
             problem=problem,

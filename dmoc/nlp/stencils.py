@@ -16,8 +16,9 @@ import casadi as ca
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.unknown import with_field
+from dmoc.configurations.acting import point_function, split_effects
 from dmoc.configurations.of_problem import configuration_of
-from dmoc.motion.dynamics import Dynamics, point_function, split_effects
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
@@ -72,8 +73,9 @@ class Writer:
         self.constraints, unknown = others[: len(problem.constraints)], iter(others[len(problem.constraints) :])
         self.effects = tuple(next(unknown) if one.adjustable else one for one in problem.effects)
         # After the effects comes an unknown inertia.
-        moving = [with_field(problem, "inertia", part.moments) for part in unknown]
-        self.dynamics = Dynamics.of(*moving or [problem], self.effects)
+        for part in unknown:
+            problem = with_field(problem, "inertia", part.moments)
+        self.dynamics = Dynamics.of(problem, self.effects)
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""

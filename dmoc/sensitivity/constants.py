@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from dmoc.basics.unknown import at, is_number, numeric_fields, opened, with_field
+from dmoc.configurations.acting import split_effects
 from dmoc.effects.base import Effect
-from dmoc.motion.dynamics import Dynamics, split_effects
+from dmoc.motion.dynamics import Dynamics
 from dmoc.parts.rows import with_symbols
 
 
@@ -35,7 +36,7 @@ def _opened(effects: Sequence[Effect], problem: Any) -> tuple[Effect, ...]:
     configuration = Dynamics.of(problem).configuration
     found = []
     for effect in effects:
-        names = []
+        names: list[str] = []
         for name in numeric_fields(effect):
             if not is_number(at(effect, name)):
                 continue

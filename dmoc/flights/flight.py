@@ -74,7 +74,9 @@ class Flight(Brief):
         late = np.flatnonzero(~(np.diff(times) > 0))
         if not np.isfinite(times).all() or len(late):
             where = int(late[0]) + 2 if len(late) else int(np.argmin(np.isfinite(times))) + 1
-            raise ValueError(f"times must increase [s]; sample {where} is at {times[where - 1]:g} s, not after the one before")
+            raise ValueError(
+                f"times must increase [s]; sample {where}, at {times[where - 1]:g} s, not after the one before"
+            )
         found: dict[str, Any] = {"times": times}
         for name in ("positions", "forces", "velocities", "rates", "attitudes"):
             given = getattr(self, name)
@@ -89,7 +91,9 @@ class Flight(Brief):
         seen = self.positions if self.positions is not None else self.attitudes
         count = 0 if seen is None else int(np.isfinite(seen.reshape(len(times), -1)).all(axis=1).sum())
         if count < FEWEST:
-            raise ValueError(f"a flight needs at least {FEWEST} samples with all axes of the position; got {count}")
+            raise ValueError(
+                f"a flight needs at least {FEWEST} samples with all axes of the position; got {count}"
+            )
         if self.forces is not None:
             checked(self, forces=_held(self.forces))
         if self.attitudes is not None and self.attitudes.ndim == 2:
@@ -104,7 +108,9 @@ class Flight(Brief):
             if given is not None and given.shape[1] != size:
                 raise ValueError(f"{name} must have {size} axes; got {given.shape[1]}")
         if self.attitudes is not None and self.attitudes.ndim == 2 and self.attitudes.shape[1] != QUATERNION:
-            raise ValueError(f"attitudes must be quaternions of four numbers, or angles [rad]; got {self.attitudes.shape[1]}")
+            raise ValueError(
+                f"attitudes must be quaternions of four numbers, or angles [rad]; got {self.attitudes.shape[1]}"
+            )
 
     @property
     def axes(self) -> int:
@@ -135,7 +141,8 @@ class Flight(Brief):
             names += [f"u{i + 1}" for i in range(rows.shape[1])] if many else list(labels[: rows.shape[1]])
             columns.append(rows)
         lines = [
-            ",".join("" if np.isnan(value) else repr(float(value)) for value in row) for row in np.hstack(columns)
+            ",".join("" if np.isnan(value) else repr(float(value)) for value in row)
+            for row in np.hstack(columns)
         ]
         with whole_file(target) as work:
             Path(work).write_text("\n".join([",".join(names), *lines]) + "\n")
@@ -145,9 +152,9 @@ class Flight(Brief):
     def read(cls, path: str | os.PathLike) -> Flight:
         """The flight of a CSV table.
 
-        Its head has `t` [s] and `x`, `y`, `z` [m], and may have `vx`.. [m/s], `fx`.. [N] in space axes or `u1`..
-        for the controls of an actuator, `angle` [rad] or `qs`, `qx`, `qy`, `qz`, and `wx`.. [rad/s]. An empty
-        cell is a sample that is missing; lines that begin with # say what a person should know.
+        Its head has `t` [s] and `x`, `y`, `z` [m], and may have `vx`.. [m/s], `fx`.. [N] in space axes or
+        `u1`.. for the controls of an actuator, `angle` [rad] or `qs`, `qx`, `qy`, `qz`, and `wx`.. [rad/s]. An
+        empty cell is a sample that is missing; lines that begin with # say what a person should know.
 
         Raises
         ------
@@ -226,7 +233,9 @@ def _table(name: str, value: Any, axes: int) -> np.ndarray:
     if found.ndim == 1 and axes == 2:
         found = found[:, None]
     if found.ndim != axes:
-        raise ValueError(f"{name} must be {'rows of numbers' if axes == 2 else 'a row of numbers'}; got {short(value)}")
+        raise ValueError(
+            f"{name} must be {'rows of numbers' if axes == 2 else 'a row of numbers'}; got {short(value)}"
+        )
     if np.isinf(found).any():
         raise ValueError(f"{name} must be finite, or NaN where a sample is missing")
     return found
@@ -245,9 +254,9 @@ def _quaternions(rows: np.ndarray) -> np.ndarray:
     lengths = np.linalg.norm(rows, axis=1)
     known = np.isfinite(lengths)
     if (off := np.abs(lengths[known] - 1)).max(initial=0.0) > UNIT_LENGTH:
-        raise ValueError(f"attitudes must be unit quaternions, scalar first; one has the length {1 + off.max():.3g} or less")
+        raise ValueError(
+            f"attitudes must be unit quaternions, scalar first; one has the length {1 + off.max():.3g} or less"
+        )
     found = rows.copy()
     found[known] = in_one_sign(rows[known] / lengths[known, None])
     return found
-
-
