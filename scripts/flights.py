@@ -17,17 +17,17 @@ DIGITS = 5
 
 
 def free_flyer() -> tuple[dmoc.Flight, str]:
-    """Ten kilograms too heavy: a free flyer on a table, pushed another way every second, its marker off centre."""
-    times = np.round(np.arange(0.0, 20.05, 0.1), 3)
+    """A free flyer on a table, pushed another way every second, its marker off its centre of mass."""
+    times = np.round(np.arange(0.0, 30.05, 0.1), 3)
     random = np.random.default_rng(7)
-    forces = np.repeat(np.round(random.uniform(-0.4, 0.4, (21, 2)), 2), 10, axis=0)[: len(times)]
+    forces = np.repeat(np.round(random.uniform(-0.4, 0.4, (31, 2)), 2), 10, axis=0)[: len(times)]
     flight = dmoc.fly(
         times,
         forces,
         dmoc.State((0, 0), (0.02, 0)),
         mass=18.9715,
         effects=[dmoc.LinearDrag(1.2)],
-        attitudes=0.1 * times,
+        attitudes=0.3 * times,
         offset=(0.05, -0.03),
         noise=0.001,
         dropped=0.05,
@@ -58,8 +58,8 @@ def satellite() -> tuple[dmoc.Flight, str]:
         seed=2,
     )
     words = (
-        "A cube that turns, simulated: mass 9.58 kg, inertia (0.153, 0.143, 0.162) kg m^2; position seen to 2 mm,\n"
-        "attitude to 2 mrad; u1..u3 are forces in space axes [N], u4..u6 torques in body axes [N m]."
+        "A cube that turns, simulated: mass 9.58 kg, inertia (0.153, 0.143, 0.162) kg m^2; position seen\n"
+        "to 2 mm, attitude to 2 mrad; u1..u3 are forces in space axes [N], u4..u6 torques in body axes [N m]."
     )
     return flight, words
 

@@ -82,7 +82,7 @@ def _draw_intervals(axes: Any, found: Estimate) -> None:
         axes.annotate(
             f"{told} {unit}   ({span})", (0, i), (0, 9), textcoords="offset points", ha="center", fontsize=10
         )
-    axes.set_yticks(range(len(found.wanted)), found.names)
+    axes.set_yticks(range(len(found.wanted)), names)
     axes.set_ylim(len(found.wanted) - 0.4, -0.8)
     axes.set(title="95 % intervals", xlabel="off the estimate [% of it, or of the interval if that is more]")
 
