@@ -1,4 +1,4 @@
-"""Solve every problem in problems/ from its defaults, draw it, and print the table of the README.
+"""Solve every problem in problems/ from its defaults, draw it, and print the table of docs/gallery.md.
 
     ./scripts/run python scripts/gallery.py                   # all of them
     ./scripts/run python scripts/gallery.py goddard           # some; the pictures of the others stay
@@ -49,7 +49,13 @@ def row(name: str, words: str, solution: Solution, holds: bool) -> str:
     seconds = solution.build_s + solution.solve_s
     value = f"{solution.objective:.6g} {solution.provenance.objective_unit}".replace("^2", "\u00b2").rstrip()
     found = value if holds else f"{value} (a check fails)" if solution.success else solution.status
-    cells = (f"[{name}](problems/gallery/{name}.png)", words, f"`dmoc solve {name}`", found, f"{seconds:.2g}")
+    cells = (
+        f"[{name}](../problems/gallery/{name}.png)",
+        words,
+        f"`dmoc solve {name}`",
+        found,
+        f"{seconds:.2g}",
+    )
     return f"| {' | '.join(cells)} |"
 
 
@@ -70,7 +76,7 @@ def draw_long_runs() -> None:
 
 
 def draw_sweep(name: str) -> None:
-    """What a sweep of the README over 525 points draws."""
+    """What the sweep of docs/sweeps.md over 525 points draws."""
     problem, varied, numerics = SWEEPS[name]
     with TemporaryDirectory() as work:
         data = sweep(problem, varied, Path(work) / "map.nc", **numerics)

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 
 def stability(
-    revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
+    revolutions: Annotated[
+        float, typer.Option(help="Of each orbit; 1000 for the figure of docs/stability.md.")
+    ] = 100,
     eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
     steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
     turned: Annotated[

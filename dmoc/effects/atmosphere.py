@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +49,7 @@ class Wind(Part):
         return as_column(self.field(t, q) if callable(self.field) else self.field)
 
 
-class Atmosphere(Part, ABC):
+class Atmosphere(Part):
     """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own.
 
     Whoever implements an atmosphere

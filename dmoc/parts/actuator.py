@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.duties import Duties
 from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
 from dmoc.parts.constraint import Constraint
@@ -15,7 +15,7 @@ from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
 
 
-class Actuator(ABC):
+class Actuator(Duties):
     """Controls u of one node and the force they make. A force actuator's controls are its force [N].
 
     A frozen dataclass that derives from this has these duties, each with a default that suits a free force:
@@ -33,6 +33,10 @@ class Actuator(ABC):
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> import casadi as ca
+    >>> import numpy as np
+    >>> from dmoc import Actuator, State, Time, TransferProblem, UniformGravity, solve
     >>> @dataclass(frozen=True)
     ... class Lift(Actuator):
     ...     limit: float
@@ -48,6 +52,11 @@ class Actuator(ABC):
     ...         return self.limit
     ...     def words(self):
     ...         return f"a force upwards of at most {self.limit:g} N"
+    >>> floors = State((0, 0), (0, 0)), State((0, 4), (0, 0))
+    >>> gravity = [UniformGravity((0, -1.0))]
+    >>> problem = TransferProblem(1.0, *floors, (1.0, 9.0), gravity, Lift(2.0), Time())
+    >>> print(f"{solve(problem).duration:.3f} s")
+    4.000 s
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
