@@ -82,7 +82,7 @@ def _draw_intervals(axes: Any, found: Estimate) -> None:
         axes.annotate(
             f"{told} {unit}   ({span})", (0, i), (0, 9), textcoords="offset points", ha="center", fontsize=10
         )
-    axes.set_yticks(range(len(found.wanted)), names)
+    axes.set_yticks(range(len(found.wanted)), _names(found))
     axes.set_ylim(len(found.wanted) - 0.4, -0.8)
     axes.set(title="95 % intervals", xlabel="off the estimate [% of it, or of the interval if that is more]")
 
@@ -97,8 +97,12 @@ def _draw_correlations(axes: Any, found: Estimate) -> None:
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=10)
-    names = [name.replace("_coefficient", "").replace("_", " ") for name in found.names]
+    names = _names(found)
     axes.set_xticks(range(len(names)), names, rotation=20, ha="right")
     axes.set_yticks(range(len(names)), names)
     axes.grid(False)
     axes.set(title="Correlations")
+
+
+def _names(found: Estimate) -> list[str]:
+    return [name.replace("_coefficient", "").replace("_", " ") for name in found.names]

@@ -150,7 +150,7 @@ def _given(seen: Any, asked: list[str], mass: float | None, scene: Any) -> dict[
 
 def _of_scene(problem: Any) -> dict[str, Any]:
     """What a problem says of its body."""
-    if not hasattr(problem, "duration_bounds"):
+    if hasattr(problem, "plan") or hasattr(problem, "members"):
         raise ValueError("--scene takes a transfer of one body, not a mission or a team")
     if problem.system is not None:
         raise ValueError("--scene takes a transfer of one body; this problem has several")

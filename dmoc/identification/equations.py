@@ -11,7 +11,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from dmoc.basics.memory import Shelf
 from dmoc.basics.numerics import nonzeros_of
@@ -87,21 +86,6 @@ def values(pieces: Sequence[Piece], x: np.ndarray, count: int) -> np.ndarray:
     return total
 
 
-def summed(pieces: Sequence[Piece], x: np.ndarray, count: int) -> tuple[np.ndarray, sparse.csr_matrix]:
-    """The results of all pieces, and their Jacobian."""
-    total, parts = np.zeros(count), []
-    for piece in pieces:
-        values, slopes = piece.at(x)
-        np.add.at(total, piece.targets, values)
-        row, column = piece.pattern
-        if len(row):
-            parts.append((slopes.ravel(), piece.targets[row].ravel(), piece.columns[column].ravel()))
-    if not parts:
-        return total, sparse.csr_matrix((count, len(x)))
-    values, rows, columns = (np.concatenate(side) for side in zip(*parts, strict=True))
-    return total, sparse.coo_matrix((values, (rows, columns)), shape=(count, len(x))).tocsr()
-
-
 @dataclass
 class Equations:
     """Rows that hold and residuals that are to be small, of all unknowns in SI units.
@@ -146,15 +130,9 @@ class Equations:
         self.residuals.append(Piece(part[0], part[1], columns, targets, numbers))
         self.labels.append((name, targets))
 
-    def rows_at(self, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_matrix]:
-        return summed(self.rows, x, self.row_count)
-
     def values_at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows and residuals alone."""
         return values(self.rows, x, self.row_count), values(self.residuals, x, self.count)
-
-    def residuals_at(self, x: np.ndarray) -> tuple[np.ndarray, sparse.csr_matrix]:
-        return summed(self.residuals, x, self.count)
 
     def with_numbers(self, columns: np.ndarray) -> np.ndarray:
         """Places of unknowns, with those of all numbers below."""

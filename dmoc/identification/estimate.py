@@ -192,8 +192,7 @@ class Estimate:
         system, kind = self.fit.system, next(iter(self.residuals))
         random = np.random.default_rng(0)
         drawn = random.standard_normal((len(self.fit.residuals), DRAWS))
-        path, numbers = system.steps_of(drawn * system.weight)
-        left = drawn + system.R @ np.vstack([path, numbers]) / system.weight
+        left = system.left_of(drawn)
         places = dict(system.equations.labels)[kind]
         alike = [_alike(left[places, i].T) for i in range(DRAWS)]
         mine = _alike(self.residuals[kind])

@@ -13,6 +13,7 @@ their covariance, with all of the path and all forces unknown beside them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -67,56 +68,128 @@ class Fit:
         return self.system.weight**2 * self.system.inverse()
 
 
+class Pattern:
+    """Where the parts of the system stand: unknowns and rows in the order of time, then the numbers."""
+
+    def __init__(self, equations: Equations, free: np.ndarray):
+        setting = equations.setting
+        self.free, self.numbers = free, setting.numbers
+        nodes = np.append(layout_nodes(setting, setting.columns)[free], equations.row_nodes)
+        order = np.argsort(nodes, kind="stable")
+        self.inner, self.split = len(order), len(free)
+        rank = np.empty(self.inner, int)
+        rank[order] = np.arange(self.inner)
+        # Of every unknown its place in the system; -1 if it is known.
+        self.place = np.full(len(setting.scales), -1)
+        self.place[free] = rank[: self.split]
+        self.place[setting.numbers] = self.inner + np.arange(len(setting.numbers))
+        self.row_place = rank[self.split :]
+        self.size = self.inner + len(setting.numbers)
+        rows, columns = [], []
+        for piece in equations.residuals:
+            used = np.unique(piece.pattern[1])
+            at = self.place[piece.columns[used]]
+            rows.append(np.broadcast_to(at[:, None], (len(used), *at.shape)).ravel())
+            columns.append(np.broadcast_to(at[None], (len(used), *at.shape)).ravel())
+        for piece in equations.rows:
+            row, column = piece.pattern
+            across, down = self.place[piece.columns[column]].ravel(), self.row_place[piece.targets[row]].ravel()
+            rows += [down, across]
+            columns += [across, down]
+        row, column = np.concatenate([*rows, []]).astype(int), np.concatenate([*columns, []]).astype(int)
+        known = (row >= 0) & (column >= 0)
+        inside, border = (row < self.inner) & (column < self.inner), (row < self.inner) & (column >= self.inner)
+        corner = (row >= self.inner) & (column >= self.inner)
+        self.parts = [
+            (mask, row[mask], column[mask])
+            for mask in (np.flatnonzero(known & part) for part in (inside, border, corner))
+        ]
+
+    def matrices(self, values: np.ndarray) -> tuple[sparse.csc_matrix, np.ndarray, np.ndarray]:
+        """The banded part, the border and the corner from all entries."""
+        found = []
+        for i, (mask, row, column) in enumerate(self.parts):
+            first = row - self.inner * (i == 2), column - self.inner * (i > 0)
+            shape = (
+                (self.inner, self.inner)
+                if i == 0
+                else (self.inner if i == 1 else len(self.numbers), len(self.numbers))
+            )
+            matrix = sparse.coo_matrix((values[mask], first), shape=shape)
+            found.append(matrix.tocsc() if i == 0 else matrix.toarray())
+        return tuple(found)  # type: ignore[return-value]
+
+    def vector(self, unknowns: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """A right-hand side from its parts for free unknowns, numbers apart, and rows."""
+        found = np.zeros((self.inner, *unknowns.shape[1:]))
+        found[self.place[self.free]] = unknowns
+        found[self.row_place] = rows
+        return found
+
+
 class System:
     """The linear system of one step at one place, factorised."""
 
-    def __init__(self, equations: Equations, free: np.ndarray, weight: float, x: np.ndarray):
-        setting = equations.setting
-        self.equations, self.weight = equations, weight
-        self.free, self.count = free, len(setting.wanted)
-        c, J = equations.rows_at(x)
-        r, R = equations.residuals_at(x)
-        scale, rows = setting.scales, equations.row_scales
-        self.c, self.r = c * rows, r * weight
-        J = sparse.diags(rows) @ J @ sparse.diags(scale)
-        R = R @ sparse.diags(scale * weight)
-        self.R = R[:, np.append(free, setting.numbers)].tocsr()
-        path, border = J[:, free], J[:, setting.numbers]
-        Rx, Rn = R[:, free], R[:, setting.numbers]
-        self.matrix = sparse.bmat([[Rx.T @ Rx, path.T], [path, None]], format="csr")
-        self.border = np.vstack([(Rx.T @ Rn).toarray(), border.toarray()])
-        self.corner = (Rn.T @ Rn).toarray()
-        nodes = np.append(layout_nodes(setting, setting.columns)[free], equations.row_nodes)
-        self.order = np.argsort(nodes, kind="stable")
-        banded = self.matrix[self.order][:, self.order].tocsc()
+    def __init__(self, equations: Equations, pattern: Pattern, weight: float, x: np.ndarray):
+        self.equations, self.pattern, self.weight, self.count = equations, pattern, weight, len(pattern.numbers)
+        scale, row_scale = equations.setting.scales, equations.row_scales
+        self.c, self.r = np.zeros(equations.row_count), np.zeros(equations.count)
+        self.gradient, entries = np.zeros(len(scale)), []
+        self._slopes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        for piece in equations.residuals:
+            values, slopes = piece.at(x)
+            row, column = piece.pattern
+            slopes = weight * slopes * scale[piece.columns[column]]
+            np.add.at(self.r, piece.targets, weight * values)
+            np.add.at(self.gradient, piece.columns[column], slopes * weight * values[row])
+            used, local = np.unique(column, return_inverse=True)
+            dense = np.zeros((piece.results, len(used), slopes.shape[1]))
+            dense[row, local] = slopes
+            entries.append(np.einsum("rzc,rwc->zwc", dense, dense).ravel())
+            self._slopes.append((slopes.ravel(), piece.targets[row].ravel(), piece.columns[column].ravel()))
+        for piece in equations.rows:
+            values, slopes = piece.at(x)
+            row, column = piece.pattern
+            np.add.at(self.c, piece.targets, values)
+            slopes = (slopes * row_scale[piece.targets[row]] * scale[piece.columns[column]]).ravel()
+            entries += [slopes, slopes]
+        self.c *= row_scale
+        self.matrix, self.border, self.corner = pattern.matrices(np.concatenate([*entries, []]))
         # In the order of time the band stays a band: any other order of columns would be dearer.
-        self.factors: SuperLU = splu(banded, permc_spec="NATURAL")
+        self.factors: SuperLU = splu(self.matrix, permc_spec="NATURAL")
         self.beyond = self.solved(self.border)
-        self.information = self.corner - self.border.T @ self.beyond
-        self.information = 0.5 * (self.information + self.information.T)
+        information = self.corner - self.border.T @ self.beyond
+        self.information = 0.5 * (information + information.T)
+
+    @cached_property
+    def slopes(self) -> sparse.csr_matrix:
+        """Weighted and scaled slopes of all residuals by all unknowns."""
+        values, rows, columns = (np.concatenate(side) for side in zip(*self._slopes, strict=True))
+        shape = len(self.r), len(self.gradient)
+        return sparse.coo_matrix((values, (rows, columns)), shape=shape).tocsr()
 
     def solved(self, right: np.ndarray) -> np.ndarray:
         """The path's part of the system, numbers fixed."""
-        found = self._once(right)
+        found = self.factors.solve(right)
         for _ in range(REFINEMENTS):
-            found = found + self._once(right - self.matrix @ found)
+            found = found + self.factors.solve(right - self.matrix @ found)
         return found
 
-    def _once(self, right: np.ndarray) -> np.ndarray:
-        found = np.empty_like(right)
-        found[self.order] = self.factors.solve(np.ascontiguousarray(right[self.order]))
-        return found
+    def step(self) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the free unknowns and of the numbers, scaled."""
+        return self._stepped(self.gradient, self.c)
 
-    def step(self, r: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of free unknowns and of numbers, scaled, for weighted residuals and scaled rows."""
-        gradient, split = self.R.T @ r, len(self.free)
-        inner = self.solved(-np.concatenate([gradient[:split], c]))
-        numbers = self.inverse() @ (-gradient[split:] - self.border.T @ inner)
-        return (inner - self.beyond @ numbers)[:split], numbers
+    def _stepped(self, gradient: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        inner = self.solved(-self.pattern.vector(gradient[self.pattern.free], c))
+        numbers = self.inverse() @ (-gradient[self.pattern.numbers] - self.border.T @ inner)
+        return (inner - self.beyond @ numbers)[self.pattern.place[self.pattern.free]], numbers
 
-    def steps_of(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same for many sets of residuals, one a column, where all rows hold."""
-        return self.step(r, np.zeros((len(self.c), r.shape[1])))
+    def left_of(self, errors: np.ndarray) -> np.ndarray:
+        """What the fit leaves of errors of all residuals, one set a column, to first order."""
+        path, numbers = self._stepped(self.slopes.T @ errors, np.zeros((len(self.c), errors.shape[1])))
+        moved = np.zeros((len(self.gradient), errors.shape[1]))
+        moved[self.pattern.free], moved[self.pattern.numbers] = path, numbers
+        return errors + self.slopes @ moved
 
     def inverse(self) -> np.ndarray:
         """The inverse of the information in what is seen."""
@@ -152,28 +225,24 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
     """
     setting = equations.setting
     free, x = np.flatnonzero(~fixed), setting.begin()
-    scale = setting.scales
-    last, converged = np.inf, False
-    for count in range(1, MOST_STEPS + 1):
-        system = System(equations, free, weight, x)
-        path, numbers = system.step(system.r, system.c)
-        most = _allowed(setting, x, numbers)
-        before = _merit(system.r, system.c)
-        for _ in range(MOST_HALVINGS):
-            trial = x.copy()
-            trial[free] += most * path * scale[free]
-            trial[setting.numbers] += most * numbers * scale[setting.numbers]
-            after = _merit_at(equations, trial, weight)
-            if np.isfinite(after) and after <= before * (1 + 1e-6) + 1e-18:
-                break
-            most *= 0.5
+    last, size, converged, steps = np.inf, np.inf, False, 0
+    pattern = Pattern(equations, free)
+    system = _system(equations, pattern, weight, x)
+    if system is None:
+        raise ValueError(
+            "the samples do not tell the path: there are too few of them, "
+            "or the scene has no meaning where they are"
+        )
+    while steps < MOST_STEPS and not converged and system is not None:
+        steps, known = steps + 1, system
+        path, numbers = system.step()
+        x = _moved(system, x, path, numbers)
         size = float(max(np.abs(path).max(initial=0.0), np.abs(numbers).max(initial=0.0)))
-        x = trial
-        steps = count
-        if size < SMALL or (size < NEAR and size > 0.3 * last):
-            converged = True
-            break
+        converged = size < SMALL or (size < NEAR and size > 0.3 * last)
         last = size
+        if not converged:
+            system = _system(equations, pattern, weight, x)
+    system = known
     residuals = equations.values_at(x)[1]
     degrees = equations.count + equations.row_count - len(free) - len(setting.wanted)
     return Fit(
@@ -187,6 +256,32 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
         size,
         system,
     )
+
+
+def _system(equations: Equations, pattern: Pattern, weight: float, x: np.ndarray) -> System | None:
+    """The system at a place; None where it is singular or the scene has no meaning."""
+    try:
+        with np.errstate(all="ignore"):
+            found = System(equations, pattern, weight, x)
+    except RuntimeError:
+        return None
+    return found if np.isfinite(found.information).all() and np.isfinite(found.beyond).all() else None
+
+
+def _moved(system: System, x: np.ndarray, path: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """The unknowns after a step, or after as much of it as makes residuals and rows no larger."""
+    equations, pattern = system.equations, system.pattern
+    setting, before = equations.setting, _merit(system.r, system.c)
+    most = _allowed(setting, x, numbers)
+    change = np.zeros_like(x)
+    change[pattern.free], change[pattern.numbers] = path, numbers
+    change *= setting.scales
+    for _ in range(MOST_HALVINGS):
+        after = _merit_at(equations, x + most * change, system.weight)
+        if np.isfinite(after) and after <= before * (1 + 1e-6) + 1e-18:
+            break
+        most *= 0.5
+    return x + most * change
 
 
 def _merit(r: np.ndarray, c: np.ndarray) -> float:

@@ -136,7 +136,7 @@ def _found(setting: Setting, sigmas: dict[str, float], spread: np.ndarray, ties:
         if "attitudes" not in sigmas:
             raise ValueError("an attitude alone needs attitude_noise [rad]")
         return _fit(setting, sigmas, spread, ties), sigmas["attitudes"]
-    if setting.writer.dynamics.configuration.surplus and "attitudes" not in sigmas:
+    if setting.path.coordinates.turns and "attitudes" not in sigmas:
         raise ValueError("a body that turns needs attitude_noise, the standard deviation of attitudes [rad]")
     if "positions" in sigmas:
         return _fit(setting, sigmas, spread, ties), sigmas["positions"]
@@ -174,7 +174,7 @@ def _fit_at(setting: Setting, sigmas: dict[str, float], spread: np.ndarray, ties
     if setting.flight.axes:
         add_positions(equations, sigmas["positions"], ties.offset, ties.delay, delay)
     fixed = np.zeros(setting.size, bool)
-    if "attitudes" in sigmas and setting.writer.dynamics.configuration.surplus:
+    if "attitudes" in sigmas and setting.path.coordinates.turns:
         add_attitudes(equations, sigmas["attitudes"])
     speeds = {name: sigma for name, sigma in sigmas.items() if name in ("velocities", "rates")}
     if speeds:

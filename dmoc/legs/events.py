@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.duties import Duties
 from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.basics.duties import Duties
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
 

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.duties import Duties
 from dmoc.basics.arguments import Vector, of_kind, vector
+from dmoc.basics.duties import Duties
 from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape

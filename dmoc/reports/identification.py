@@ -41,5 +41,6 @@ def fit_told(found: Estimate) -> str:
         size = f"Noise of positions found: {found.noise:.3g} {unit}"
     else:
         per = found.chi_squared / max(degrees, 1)
-        size = f"Squares of residuals over noise: {per:.3g} on average (right: 1; chance of more: {found.fitting:.2g})"
+        chance = f"right: 1; chance of more: {found.fitting:.2g}"
+        size = f"Squares of residuals over noise: {per:.3g} on average ({chance})"
     return f"{size}. Residuals alike from sample to sample: chance of more so {found.whiteness:.2g}."

@@ -10,7 +10,7 @@ import pytest
 
 import dmoc
 
-BASES = "Conservative Force Actuator Objective Constraint Boundary Holonomic".split()
+BASES = ["Conservative", "Force", "Actuator", "Objective", "Constraint", "Boundary", "Holonomic"]
 
 
 @pytest.mark.parametrize("name", BASES)
