@@ -9,6 +9,7 @@ have changed without its numbers having changed.
 from __future__ import annotations
 
 import hashlib
+import os
 import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
@@ -174,3 +175,10 @@ def _is_patched(kind: type) -> bool:
     ]
     # Methods that dataclasses generate do not belong to dmoc either, but nobody patched them in.
     return any(not _is_own(part) and part.__module__ not in sys.stdlib_module_names for part in methods)
+
+
+def usable_cores() -> int:
+    """How many cores this process may use, where the system says so, else how many there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

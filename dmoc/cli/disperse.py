@@ -49,7 +49,7 @@ def disperse(
 
         print(report.as_text(report.dispersion_object(found, solution)))
         return
-    from dmoc.reports.dispersion import dispersion_report
+    from dmoc.reports.flights import dispersion_report
     from dmoc.reports.layout import console
 
     console().print(dispersion_report(found, solution))

@@ -93,7 +93,7 @@ def _show(found: Estimate, as_json: bool, out: Path | None, plot: Path | None) -
 
         print(as_text(found.as_object()))
         return
-    from dmoc.reports.identification import estimate_report
+    from dmoc.reports.flights import estimate_report
     from dmoc.reports.layout import console
 
     console().print(estimate_report(found))

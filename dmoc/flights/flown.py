@@ -81,12 +81,8 @@ def fly(
     ValueError
         If a number has no meaning or shapes do not fit.
     """
-    given = entries(times)
-    clock = np.array([number("times", one, "s") for one in given or ()])
-    if len(clock) < 3 or not (np.diff(clock) > 0).all():
-        raise ValueError(f"times must be at least 3 increasing numbers [s]; got {short(times)}")
-    lost = number("dropped", dropped, "-", nonnegative=True)
-    if lost >= 1:
+    clock, late = _clock(times), number("delay", delay, "s", nonnegative=True)
+    if (lost := number("dropped", dropped, "-", nonnegative=True)) >= 1:
         raise ValueError(f"dropped must be less than 1 [-]; got {lost:g}")
     whole("seed", seed, least=0)
     problem = TransferProblem(
@@ -99,44 +95,55 @@ def fly(
         start_time=float(clock[0]),
         inertia=inertia,
     )
-    late = number("delay", delay, "s", nonnegative=True)
     commands = _at_times("forces", forces, clock, problem.controls)
-    random = {
-        kind: np.random.default_rng([seed, i]) for i, kind in enumerate(("y", "f", "v", "a", "w", "lost"))
-    }
-    force = strength * commands + number("force_noise", force_noise, "N", nonnegative=True) * random[
-        "f"
-    ].standard_normal(commands.shape)
-    if turn is not None:
-        angles = [number("turn", one, "rad") for one in (entries(turn) or (turn,))]
-        u = ca.SX.sym("u", problem.controls)
-        way = ca.Function("turn", [u], [turned(angles, u, problem.dimension)])
-        force = way(commands.T * strength).full().T + (force - strength * commands)
+    kinds = ("positions", "force", "velocities", "attitudes", "rates", "lost")
+    random = {kind: np.random.default_rng([seed, i]) for i, kind in enumerate(kinds)}
+    force = _turned(problem, number("strength", strength, "-") * commands, turn)
+    force = force + _errors("force_noise", force_noise, "N", random["force"], commands.shape)
     position, speed, attitude, rate = _flown(problem, clock, force, late)
     found: dict[str, Any] = {}
     if attitude is None and attitudes is not None:
         attitude = _at_times("attitudes", attitudes, clock, None)
     if attitude is not None:
-        found["attitudes"] = _seen_attitudes(attitude, attitude_noise, random["a"])
+        found["attitudes"] = _seen_attitudes(attitude, attitude_noise, random["attitudes"])
     if position.shape[1]:
-        marker = position + _arm(attitude, offset, position)
-        found["positions"] = marker + number("noise", noise, "m", nonnegative=True) * random[
-            "y"
-        ].standard_normal(position.shape)
-        found["positions"][clock < clock[0] + late] = np.nan
-    for kind, sigma, values, key in (
-        ("velocities", velocity_noise, speed, "v"),
-        ("rates", rate_noise, rate, "w"),
+        errors = _errors("noise", noise, "m", random["positions"], position.shape)
+        found["positions"] = position + _arm(attitude, offset, position) + errors
+    for kind, name_of_it, sigma, values, unit in (
+        ("velocities", "velocity_noise", velocity_noise, speed, "m/s"),
+        ("rates", "rate_noise", rate_noise, rate, "rad/s"),
     ):
         if sigma is not None and values is not None:
-            found[kind] = values + number(f"{kind} noise", sigma, "", nonnegative=True) * random[
-                key
-            ].standard_normal(values.shape)
-    gone = random["lost"].random(len(clock)) < lost
-    for kind in ("positions", "velocities", "rates"):
-        if kind in found:
-            found[kind][gone] = np.nan
+            found[kind] = values + _errors(name_of_it, sigma, unit, random[kind], values.shape)
+    gone = (random["lost"].random(len(clock)) < lost) | (clock < clock[0] + late)
+    for kind in found.keys() - {"attitudes"}:
+        found[kind][gone] = np.nan
     return Flight(clock, forces=commands, name=name, **found)
+
+
+def _clock(times: Any) -> np.ndarray:
+    clock = np.array([number("times", one, "s") for one in entries(times) or ()])
+    if len(clock) < 3 or not (np.diff(clock) > 0).all():
+        raise ValueError(f"times must be at least 3 increasing numbers [s]; got {short(times)}")
+    return clock
+
+
+def _errors(name: str, sigma: Any, unit: str, random: Any, shape: tuple) -> np.ndarray:
+    return number(name, sigma, unit, nonnegative=True) * random.standard_normal(shape)
+
+
+def _turned(problem: TransferProblem, commands: np.ndarray, turn: Any) -> np.ndarray:
+    """Commands turned by an angle, or by a rotation vector in space."""
+    if turn is None:
+        return commands
+    angles = [number("turn", one, "rad") for one in (entries(turn) or (turn,))]
+    wanted = {1: 0, 2: 1, 3: 3}[problem.dimension]
+    if len(angles) != wanted:
+        raise ValueError(
+            f"turn must have {wanted} entries in {problem.dimension} axes [rad]; got {short(turn)}"
+        )
+    u = ca.SX.sym("u", problem.controls)
+    return ca.Function("turn", [u], [turned(angles, u, problem.dimension)])(commands.T).full().T
 
 
 def _at_times(name: str, given: Any, times: np.ndarray, size: int | None) -> np.ndarray:

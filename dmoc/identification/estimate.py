@@ -19,23 +19,14 @@ from dmoc.basics.files import as_path, whole_file
 from dmoc.basics.plain import finite
 from dmoc.identification.equations import residual_parts
 from dmoc.identification.fit import Fit
+from dmoc.identification.remarks import PART, on_fit, on_sight
 from dmoc.identification.wanted import Wanted
 from dmoc.results.outcome import shown
 
 # Intervals hold a number with this probability [-].
 SURE = 0.95
-# Two numbers are hardly told apart from this correlation on [-].
-ALIKE = 0.98
-# A number is hardly seen whose standard deviation is so large a part of itself, or of what was believed [-].
-HARDLY, BELIEVED = 1.0, 0.9
-# A number takes part in a direction that is not seen by this much of it [-].
-PART = 0.1
 # Residuals are compared with so many drawn ones, by correlations over so many samples.
 DRAWS, LAGS = 200, 10
-# What is less likely than this is told [-].
-UNLIKELY = 0.01
-# Residuals whose squares are below this part of what noise would leave are no noise [-].
-TINY = 1e-2
 
 
 @dataclass(frozen=True, repr=False)
@@ -201,56 +192,7 @@ class Estimate:
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know before relying on the numbers, a sentence each."""
-        return tuple([*self._on_sight(), *self._on_fit()])
-
-    def _on_sight(self) -> list[str]:
-        """Numbers that the flight does not see, or hardly."""
-        said, sigma = [], self.sigma
-        for way in self.fit.unseen.T:
-            names = [name for name, part in zip(self.names, way, strict=True) if abs(part) > PART]
-            if len(names) == 1:
-                said.append(
-                    f"{names[0]} is not observable: this flight would be the same with any value of it."
-                )
-            else:
-                said.append(
-                    f"{' and '.join(names)} are not observable: this flight tells a combination of them alone. "
-                    "State one of them, or fly so that they act differently."
-                )
-        for one, value in zip(self.wanted, self._values, strict=True):
-            if not np.isfinite(sigma[one.name]):
-                continue
-            if one.sigma is not None and sigma[one.name] > BELIEVED * one.sigma:
-                said.append(
-                    f"{one.name} is hardly observable: the flight adds next to nothing to what was believed."
-                )
-            elif one.kind in ("mass", "scene", "strength") and sigma[one.name] > HARDLY * abs(value):
-                said.append(f"{one.name} is hardly observable: its standard deviation is larger than itself.")
-        alike = self.correlation
-        for i, first in enumerate(self.names):
-            for j in range(i):
-                if abs(alike[i, j]) > ALIKE:
-                    said.append(
-                        f"{self.names[j]} and {first} are hardly told apart: correlation {alike[i, j]:.4f}."
-                    )
-        return said
-
-    def _on_fit(self) -> list[str]:
-        said = []
-        if not self.found_noise and self.fitting < UNLIKELY:
-            factor = np.sqrt(self.chi_squared / max(self.fit.degrees, 1))
-            said.append(
-                f"Residuals are {factor:.3g} times as large as the stated noise: intervals are too narrow. "
-                "Something acts that the scene does not have, or the noise is larger."
-            )
-        if self.fit.degrees > 0 and self.chi_squared < TINY * self.fit.degrees:
-            said.append("Residuals are far smaller than the stated noise: intervals are too wide.")
-        elif self.whiteness < UNLIKELY:
-            said.append(
-                "Residuals are alike from sample to sample: something acts that the scene does not have, such "
-                "as an effect, a delay or errors of the forces."
-            )
-        return said
+        return tuple([*on_sight(self), *on_fit(self)])
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """The figure: path and residuals, intervals, correlations; with a path, that file."""

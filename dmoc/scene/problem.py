@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.basics.unknown import has_unknown
-from dmoc.configurations.of_problem import free_configuration
-from dmoc.configurations.rigid import Moments
+from dmoc.configurations.of_problem import free_configuration, unknown_parts
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.mixed import with_both
@@ -170,9 +168,7 @@ class TransferProblem:
     def adjustable_parts(self) -> tuple:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
         # The stencils and the parameter vector of an NLP both follow this order.
-        unknown: list[Any] = [effect for effect in self.effects if effect.adjustable]
-        unknown += [Moments(self.inertia)] if has_unknown(self.inertia) else []
-        return (self.actuator, self.objective, self.start, self.goal, *self.constraints, *unknown)
+        return (self.actuator, self.objective, self.start, self.goal, *self.constraints, *unknown_parts(self))
 
     @property
     def inertias(self) -> list[Any]:

@@ -12,8 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
 from dmoc.basics.compiled import compiler, folder
-from dmoc.basics.cores import usable_cores
-from dmoc.basics.memory import forget
+from dmoc.basics.memory import forget, usable_cores
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.solve import solve
 
