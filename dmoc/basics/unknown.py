@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.plain import LONGEST, unbroken
+
 
 class Unknown(float):
     """A number of a problem that is not known well.
@@ -34,16 +36,18 @@ class Unknown(float):
     sigma: float | None
 
     def __new__(cls, value: Any, sigma: Any = None) -> Any:
-        if isinstance(value, (list, tuple, np.ndarray)):
-            each = sigma if isinstance(sigma, (list, tuple, np.ndarray)) else [sigma] * len(value)
+        if _is_several(value):
+            each = sigma if _is_several(sigma) else [sigma] * len(value)
             if len(each) != len(value):
-                raise ValueError(f"Unknown has {len(value)} values but {len(each)} standard deviations")
+                raise ValueError(
+                    f"Unknown has {len(value)} values but {len(each)} standard deviations; give one each"
+                )
             return tuple(cls(one, spread) for one, spread in zip(value, each, strict=True))
         made = super().__new__(cls, _finite("value", value))
         made.sigma = None if sigma is None else _finite("sigma", sigma)
         if made.sigma is not None and made.sigma <= 0:
             raise ValueError(
-                f"Unknown: sigma must be greater than 0; got {sigma}: leave it out if nothing is known"
+                f"Unknown: sigma must be greater than 0; got {made.sigma:g}: leave it out if nothing is known"
             )
         return made
 
@@ -55,13 +59,17 @@ class Unknown(float):
         return f"Unknown({float(self)!r}{known})"
 
 
+def _is_several(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
 def _finite(name: str, value: Any) -> float:
     try:
         found = math.nan if isinstance(value, (bool, str, bytes)) else float(value)
-    except (TypeError, ValueError):
+    except Exception:  # whatever a user's object raises
         found = math.nan
     if not math.isfinite(found):
-        raise ValueError(f"Unknown: {name} must be a finite number; got {value!r}")
+        raise ValueError(f"Unknown: {name} must be a finite number; got {unbroken(repr(value))[:LONGEST]}")
     return found
 
 

@@ -82,7 +82,7 @@ class Flight(Brief):
             given = getattr(self, name)
             if given is None:
                 continue
-            rows = _table(name, given, 1 if name == "attitudes" and np.ndim(given) == 1 else 2)
+            rows = _table(name, given, 0 if name == "attitudes" else 2)
             if len(rows) != len(times):
                 raise ValueError(f"{name} has {len(rows)} samples but times has {len(times)}; give one a time")
             found[name] = rows
@@ -162,6 +162,8 @@ class Flight(Brief):
             With file and line, if the table cannot be read or is no flight.
         """
         file = as_path(path)
+        if not file.is_file():
+            raise ValueError(f"there is no flight {file}; give a CSV table")
         try:
             text = file.read_text()
         except UnicodeDecodeError:
@@ -228,11 +230,11 @@ def _numbers(file: Path, at: int, line: str, head: list[str]) -> list[float]:
 def _table(name: str, value: Any, axes: int) -> np.ndarray:
     try:
         found = np.array(value, float)
-    except (TypeError, ValueError):
+    except Exception:  # whatever a user's object raises
         raise ValueError(f"{name} must be numbers; got {short(value)}") from None
     if found.ndim == 1 and axes == 2:
         found = found[:, None]
-    if found.ndim != axes:
+    if (axes and found.ndim != axes) or not 1 <= found.ndim <= 2:
         raise ValueError(
             f"{name} must be {'rows of numbers' if axes == 2 else 'a row of numbers'}; got {short(value)}"
         )

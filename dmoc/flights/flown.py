@@ -150,13 +150,13 @@ def _at_times(name: str, given: Any, times: np.ndarray, size: int | None) -> np.
     """Values at all times, from a table or a function of the time."""
     try:
         found = np.array([given(t) for t in times], float) if callable(given) else np.array(given, float)
-    except (TypeError, ValueError):
+    except Exception:  # whatever a user's object raises
         raise ValueError(
             f"{name} must be numbers, one row a time, or a function of the time; got {short(given)}"
         ) from None
     if found.ndim == 1 and size == 1:
         found = found[:, None]
-    if len(found) != len(times) or (size is not None and found.shape != (len(times), size)):
+    if found.shape[:1] != times.shape or (size is not None and found.shape != (len(times), size)):
         raise ValueError(f"{name} must have shape ({len(times)}, {size}); got {found.shape}")
     if not np.isfinite(found).all():
         raise ValueError(f"{name} must be finite")

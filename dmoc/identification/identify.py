@@ -119,7 +119,7 @@ def identify(
     began = time.perf_counter()
     flight = flight if isinstance(flight, Flight) else Flight.read(flight)
     sigmas = sigmas_of(flight, noise, velocity_noise, attitude_noise, rate_noise)
-    problem = scene_of(flight, mass, tuple(effects), actuator, inertia)
+    problem = scene_of(flight, mass, effects, actuator, inertia)
     ties = ties_of(flight, problem, offset, center, strength, turn, delay)
     spread = force_noise_of(force_noise, problem.controls)
     problem, wanted = wanted_of(problem, mass, inertia, ties)

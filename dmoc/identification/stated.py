@@ -49,7 +49,7 @@ def sigmas_of(flight: Flight, noise: Any, velocity: Any, attitude: Any, rate: An
     return found
 
 
-def scene_of(flight: Flight, mass: Any, effects: tuple, actuator: Any, inertia: Any) -> TransferProblem:
+def scene_of(flight: Flight, mass: Any, effects: Any, actuator: Any, inertia: Any) -> TransferProblem:
     """The scene, with values in place of unknowns that it does not hold as symbols."""
     mass = number("mass", mass, "kg", positive=True)
     last = flight.axes or SPACE
@@ -116,8 +116,8 @@ def ties_of(
         raise ValueError(
             f"turn has no meaning for {type(problem.actuator).__name__} in {axes} axes; leave it out"
         )
-    number("delay", delay, "s")
-    if abs(delay) >= np.diff(flight.times).max():
+    delay = number("delay", delay, "s")
+    if abs(float(delay)) >= np.diff(flight.times).max():
         raise ValueError(
             f"delay must be less than the time between samples, {np.diff(flight.times).max():.3g} s; "
             f"got {float(delay):g} s: shift the times of the forces by whole samples first"
@@ -126,7 +126,7 @@ def ties_of(
     return Ties(
         offset,
         _vector("center", center, "m", SPACE),
-        (strength,) if one else _vector("strength", strength, "-", count),
+        (number("strength", strength, "-"),) if one else _vector("strength", strength, "-", count),
         _vector("turn", turn, "rad", angles),
         delay,
     )

@@ -610,7 +610,7 @@ VERBS = {
     "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
     "identify": (
         ["free_flyer", "--noise", "0.001"],
-        ["--unknown", "--scene", "--mass", "--noise", "--force-noise", "--order", "--out", "--plot"],
+        ["--unknown", "--mass", "--noise", "--force-noise", "--order", "--out", "--plot"],
     ),
     "check": (["nothing.nc"], ["--problem"]),
     "plot": (["nothing.nc"], ["--out", "--problem"]),
