@@ -47,12 +47,12 @@ class Optimum:
     sense: float
 
     @classmethod
-    def of(cls, solution: Any, problem: Any) -> Optimum:
+    def of(cls, solution: Any, problem: Any, opened: bool = True) -> Optimum:
         """That of a solution, of a transfer, a mission or a team, with its problem.
 
-        The constants of effects are parameters of it.
+        Opened, the constants of effects are parameters of it.
         """
-        problem = with_open_effects(problem)
+        problem = with_open_effects(problem) if opened else problem
         if hasattr(problem, "plan") or hasattr(problem, "members"):
             return cls._of_mission(solution, problem)
         path = solution.path
