@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.guess.starting import starting_guess
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.motion.stability import refuse_unstable
@@ -37,7 +38,7 @@ class Planner:
         """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
         start = starting_guess(problem, check_mesh(steps), order, hold, guess)
         scene = Scene(problem, scheme(order), steps, hold)
-        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds)
+        refuse_unstable(Dynamics.of(problem), start, problem.start_time, problem.duration_bounds)
         return cls(scene, transcribe_onto(problem, start, units_of(problem, start)), start)
 
     @cached_property
@@ -122,6 +123,7 @@ class Planner:
             mass
             | states
             | reactions
+            | {name: numbers[name] for name in scene.constants}
             | {
                 "forces": found["force"],
                 "start_time": numbers["start_time"],

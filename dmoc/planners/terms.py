@@ -106,7 +106,12 @@ TERMS = {
 def number_terms(names: Iterable[str]) -> dict[str, Term]:
     """Further arguments that are numbers of the actuator."""
     units = {"actuator_exhaust_velocity": "m/s"}
-    return {name: Term(units.get(name, ""), "of the actuator, as in the problem") for name in names}
+    return {
+        name: Term(
+            units.get(name, ""), f"of the {'actuator' if name in units else 'effects'}, as in the problem"
+        )
+        for name in names
+    }
 
 
 def named(name: str, given: dict[str, ca.MX], outputs: dict[str, ca.MX]) -> ca.Function:
