@@ -5,17 +5,19 @@
     ./scripts/run python scripts/gallery.py stability         # the long runs of `dmoc stability`, two minutes
     ./scripts/run python scripts/gallery.py sweep             # the map of times and angles, one minute
     ./scripts/run python scripts/gallery.py porkchop          # the map of launch windows, two minutes
+    ./scripts/run python scripts/gallery.py report            # the page for a browser, with Chromium
 
 Pictures go to problems/gallery. The exit code is 1 if a problem is not solved or fails a check.
 """
 
 import sys
 from pathlib import Path
+from shutil import which
 from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from dmoc import solve, sweep, verify
+from dmoc import report, solve, sweep, verify
 from dmoc.basics.docstrings import first_line
 from dmoc.charts.stability import stability_figure
 from dmoc.charts.study import save_page
@@ -36,6 +38,8 @@ LARGEST = 250_000
 LONG_RUNS = "stability"
 # The arguments that stand for the sweeps, and the names of their pictures.
 SWEEP, PORKCHOP = "sweep", "porkchop"
+# The argument that stands for the page for a browser, whose problem this is, and its size [pixels].
+PAGE, PAGE_OF, PAGE_SIZE = "report", "free_flyer", {"width": 1400, "height": 1120}
 # What is varied in the sweeps: duration [s] and angle [rad] of orbit_raise, departure and flight time [s] from
 # one planet to another, 525 points each.
 SWEEPS = {
@@ -84,8 +88,29 @@ def draw_sweep(name: str) -> None:
     reduce_colors(GALLERY / f"{name}.png")
 
 
+def draw_page() -> None:
+    """What a browser shows of `dmoc report`, at a third of the flight."""
+    from playwright.sync_api import sync_playwright
+
+    arguments = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with TemporaryDirectory() as work, sync_playwright() as driver:
+        file = Path(work) / "flight.html"
+        report(solve(load_problem(str(PROBLEMS / f"{PAGE_OF}.py")).make()), file)
+        browser = driver.chromium.launch(executable_path=which("chromium"), args=arguments)
+        view = browser.new_page(viewport=PAGE_SIZE)
+        view.goto(file.as_uri())
+        view.wait_for_selector("html[data-ready=yes]", timeout=120_000)
+        view.evaluate("slider.value = 80; slider.dispatchEvent(new Event('input'))")
+        view.wait_for_timeout(1000)
+        view.screenshot(path=GALLERY / f"{PAGE}.png")
+        browser.close()
+    reduce_colors(GALLERY / f"{PAGE}.png")
+
+
 def main(names: list[str]) -> int:
     GALLERY.mkdir(exist_ok=True)
+    if PAGE in names or not names:
+        draw_page()
     for name in SWEEPS:
         if name in names or not names:
             draw_sweep(name)
@@ -94,12 +119,12 @@ def main(names: list[str]) -> int:
     print("| problem | what it is | command | objective | s |", "|---|---|---|---|---|", sep="\n")
     worst = 0
     wanted = names or sorted(path.stem for path in PROBLEMS.glob("*.py"))
-    for name in [name for name in wanted if name not in (LONG_RUNS, *SWEEPS)]:
+    for name in [name for name in wanted if name not in (PAGE, LONG_RUNS, *SWEEPS)]:
         file = load_problem(str(PROBLEMS / f"{name}.py"))
         solution = solve(file.make())
-        report = verify(solution) if solution.success else None
-        holds = report is not None and report.ok
-        save_figure(solution, GALLERY / f"{name}.png", report, dpi=DPI)
+        checked = verify(solution) if solution.success else None
+        holds = checked is not None and checked.ok
+        save_figure(solution, GALLERY / f"{name}.png", checked, dpi=DPI)
         reduce_colors(GALLERY / f"{name}.png")
         print(row(name, first_line(file.docstring).rstrip("."), solution, holds), flush=True)
         worst |= not holds

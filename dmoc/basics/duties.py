@@ -1,16 +1,40 @@
-"""What whoever derives from a base class has to do, told in one line where it was not done."""
+"""What was not done or does not exist, told in one line: duties of a base class, arguments of a call."""
 
 from __future__ import annotations
 
 import difflib
 import inspect
 from abc import ABC
+from functools import cache
 from typing import Any, ClassVar
 
 from dmoc.basics.docstrings import first_line
 
 
-class Duties(ABC):
+class Named:
+    """What is made with arguments by name; one that does not exist is refused with those that do."""
+
+    def __new__(cls, *given: Any, **named: Any) -> Any:
+        known, any_name = _arguments(cls)
+        if wrong := [name for name in named if name not in known and not any_name]:
+            raise ValueError(_unknown(cls, wrong[0], known))
+        return super().__new__(cls)
+
+
+@cache
+def _arguments(cls: Any) -> tuple[tuple[str, ...], bool]:
+    """The names of the arguments that make one, and whether it takes any name."""
+    _, *entries = inspect.signature(cls.__init__).parameters.values()
+    return tuple(entry.name for entry in entries), any(entry.kind is entry.VAR_KEYWORD for entry in entries)
+
+
+def _unknown(cls: type, name: str, known: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    return f"{cls.__name__} has no argument {name}{meant}; it takes: {', '.join(known) or 'none'}"
+
+
+class Duties(Named, ABC):
     """A base class whose abstract methods are the duties of whoever derives from it.
 
     `one_of` names methods of which at least one must be written, too.
@@ -23,7 +47,7 @@ class Duties(ABC):
             raise ValueError(_told(cls, lacking))
         if cls.one_of and all(getattr(cls, name) is getattr(_home(cls, name), name) for name in cls.one_of):
             raise ValueError(_nothing_told(cls))
-        return super().__new__(cls)
+        return super().__new__(cls, *given, **named)
 
 
 def _home(cls: type, name: str) -> type:

@@ -59,8 +59,8 @@ def worth(planner: Planner) -> Exported:
 def covariance(scene: Scene) -> Exported:
     """The covariance of position and velocity along a plan, by the Jacobian of every step.
 
-    P_(k+1) = A P_k A' + B Q B': A by the state at the begin of the step, B by its forces, whose errors are drawn
-    anew each step and are the same at all its nodes.
+    P_(k+1) = A P_k A' + B Q B': A by the state at the begin of the step, B by its forces, whose errors are
+    drawn anew each step and are the same at all its nodes.
     """
     n, freedom, columns = scene.dynamics.positions, scene.dynamics.freedom, scene.step_columns
     step = one_step(scene).function

@@ -1,4 +1,4 @@
-"""Worth, covariance and prediction as CasADi functions give what Python gives; unknown constants are arguments."""
+"""Worth, covariance and prediction as CasADi functions; unknown constants of effects as arguments."""
 
 import casadi as ca
 import numpy as np

@@ -79,6 +79,42 @@ def test_what_is_missing_is_named_with_what_it_is_for(kind, told):
     assert told in str(raised.value) and "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    "make, told",
+    [
+        (
+            lambda: dmoc.Orbit(mu=1.0, semi_major_axis=2.0),
+            "Orbit has no argument semi_major_axis; it takes: mu, a, e,",
+        ),
+        (
+            lambda: dmoc.KeepOut(centre=(0, 0), radius=1),
+            "no argument centre (did you mean center?); it takes: center",
+        ),
+        (lambda: dmoc.Effort(weight=3), "Effort has no argument weight; it takes: none"),
+        (
+            lambda: dmoc.TransferProblem(mass=1.0, effect=[]),
+            "TransferProblem has no argument effect (did you mean effects?)",
+        ),
+        (lambda: dmoc.Leg(time=1.0), "Leg has no argument time"),
+    ],
+)
+def test_an_argument_that_does_not_exist_is_told_with_those_that_do(make, told):
+    with pytest.raises(ValueError) as raised:
+        make()
+    assert told in str(raised.value)
+
+
+def test_a_part_may_take_arguments_of_any_name():
+    class Loose(dmoc.Force):
+        def __init__(self, **numbers):
+            self.numbers = numbers
+
+        def force(self, t, q, v, m):
+            return -v
+
+    assert Loose(a=1).numbers == {"a": 1}
+
+
 OWN = '''
 """Own."""
 
