@@ -18,8 +18,8 @@ import numpy as np
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
-from dmoc.parts.rows import title, with_symbols
-from dmoc.planners.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms
+from dmoc.parts.rows import with_symbols
+from dmoc.planners.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms, opened_effects
 from dmoc.scene.problem import TransferProblem
 
 
@@ -42,15 +42,8 @@ class Scene:
         return Dynamics.of(self.problem, self._opened[0])
 
     @cached_property
-    def _opened(self) -> tuple[tuple, dict[str, int]]:
-        """The effects with symbols, and the names of these with their sizes."""
-        effects, sizes = [], {}
-        for i, effect in enumerate(self.problem.effects):
-            twin, symbols = with_symbols(effect, "effect")
-            effects.append(twin if symbols else effect)
-            for field, symbol in zip(effect.adjustable, symbols, strict=True):
-                sizes[f"{title(effect, i)}_{field.replace('.', '_')}"] = symbol.numel()
-        return tuple(effects), sizes
+    def _opened(self) -> tuple[tuple, dict[str, int], dict[str, Term]]:
+        return opened_effects(self.problem.effects)
 
     @property
     def constants(self) -> dict[str, int]:
@@ -109,7 +102,7 @@ class Scene:
     @cached_property
     def terms(self) -> dict[str, Term]:
         """What arguments of this scene mean where it is not what they mean in all."""
-        own = number_terms(self.constants)
+        own = dict(self._opened[2])
         if not self.held:
             return own
         units = dict.fromkeys(self.problem.actuator.units(self.axes))
@@ -255,8 +248,8 @@ def one_step(scene: Scene, name: str = "step") -> Exported:
     """The one-step map."""
     given = scene.symbols(*scene.names("place"), *scene.names("speed"), "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
-    numbers = scene.flow_numbers() | scene.symbols(*scene.constants)
-    given |= numbers
+    numbers = scene.flow_numbers()
+    given |= numbers | scene.symbols(*scene.constants)
     q, v = scene.joined(given, "place"), scene.joined(given, "speed")
     m, t, h = given["mass"], given["time"], given["time_step"]
     momentum = scene.momentum(t, q, v, m, scene.constants_in(given))
@@ -277,8 +270,8 @@ def all_steps(scene: Scene, name: str = "rollout") -> Exported:
     """The integrator over all steps from the start."""
     state_names = *scene.names("place"), *scene.names("speed")
     given = scene.symbols(*state_names, "mass", "start_time", "duration", "forces")
-    numbers = scene.flow_numbers() | scene.symbols(*scene.constants)
-    given |= numbers
+    numbers = scene.flow_numbers()
+    given |= numbers | scene.symbols(*scene.constants)
     q, v = scene.joined(given, "place"), scene.joined(given, "speed")
     m, t = given["mass"], given["start_time"]
     momentum = scene.momentum(t, q, v, m, scene.constants_in(given))

@@ -8,7 +8,7 @@ import casadi as ca
 
 from dmoc.planners.functions import Scene, one_step
 from dmoc.planners.planner import Planner
-from dmoc.planners.terms import PLACE, TERMS, Exported, Term, named
+from dmoc.planners.terms import PLACE, TERMS, Exported, Term, named, number_terms
 
 
 def worth(planner: Planner) -> Exported:
@@ -114,6 +114,6 @@ def covariance(scene: Scene) -> Exported:
         ),
         "covariances": Term("m, m/s", "covariances of position and velocity at the step ends, side by side"),
     }
-    terms |= {name: Term("", "of the actuator, as in the problem") for name in numbers}
+    terms |= number_terms(numbers.keys() - scene.constants.keys())
     words = "covariance of position and velocity along a plan, by the Jacobians of its steps"
     return Exported(named("covariance", given, outputs), words, terms)

@@ -1,5 +1,7 @@
 """Worth, covariance and prediction as CasADi functions; unknown constants of effects as arguments."""
 
+import json
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -118,6 +120,8 @@ def test_unknown_constants_are_arguments_of_all_functions(order, steps, tmp_path
     effects = [LinearDrag(Unknown(1.0)), UniformGravity((0, Unknown(-0.1)))]
     export(scene(effects, zones=0), tmp_path / "planner", order=order, steps=steps, c=False)
     functions = {path.stem: ca.Function.load(str(path)) for path in (tmp_path / "planner").glob("*.casadi")}
+    listed = json.loads((tmp_path / "planner" / "manifest.json").read_text())["functions"]["rollout"]["inputs"]
+    assert listed[-2]["unit"] == "N s/m" and listed[-1]["unit"] == "m/s^2"
     drag, gravity = "linear_drag_1_coefficient", "uniform_gravity_2_acceleration"
     other = {drag: 1.5, gravity: [0, -0.12]}
     plan = functions["solver"](**(functions["nominal"]() | other))
