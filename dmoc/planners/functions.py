@@ -254,7 +254,7 @@ def one_step(scene: Scene, name: str = "step") -> Exported:
     m, t, h = given["mass"], given["time"], given["time_step"]
     momentum = scene.momentum(t, q, v, m, scene.constants_in(given))
     state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), momentum, m, 0)
-    same = ca.vertcat(t, h, q, *numbers.values())
+    same = ca.vertcat(t, h, q, *numbers.values(), *scene.constants_in(given))
     end, _, _, velocity = march(scene)(state, ca.vec(given["forces"]), same)
     outputs = scene.parted(q + end[: scene.dynamics.positions], "place", "next_")
     outputs |= scene.parted(velocity, "speed", "next_")
@@ -276,7 +276,7 @@ def all_steps(scene: Scene, name: str = "rollout") -> Exported:
     m, t = given["mass"], given["start_time"]
     momentum = scene.momentum(t, q, v, m, scene.constants_in(given))
     state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), momentum, m, 0)
-    forces, same = scene.split(given["forces"]), ca.vertcat(q, *numbers.values())
+    forces, same = scene.split(given["forces"]), ca.vertcat(q, *numbers.values(), *scene.constants_in(given))
     if scene.mesh:
         ends = ca.DM(scene.mesh).T
         times = ca.vertcat(t + given["duration"] * ends[:-1], given["duration"] * ca.diff(ends, 1, 1))

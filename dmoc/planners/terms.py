@@ -109,12 +109,7 @@ TERMS = {
 def number_terms(names: Iterable[str]) -> dict[str, Term]:
     """Further arguments that are numbers of the actuator."""
     units = {"actuator_exhaust_velocity": "m/s"}
-    return {
-        name: Term(
-            units.get(name, ""), f"of the {'actuator' if name in units else 'effects'}, as in the problem"
-        )
-        for name in names
-    }
+    return {name: Term(units.get(name, ""), "of the actuator, as in the problem") for name in names}
 
 
 def opened_effects(effects: Sequence[Any]) -> tuple[tuple, dict[str, int], dict[str, Term]]:
@@ -123,8 +118,8 @@ def opened_effects(effects: Sequence[Any]) -> tuple[tuple, dict[str, int], dict[
     for i, effect in enumerate(effects):
         twin, symbols = with_symbols(effect, "effect")
         found.append(twin if symbols else effect)
-        for field, symbol in zip(effect.adjustable, symbols, strict=True):
-            name, (inside, _, last) = f"{title(effect, i)}_{field.replace('.', '_')}", field.rpartition(".")
+        for one, symbol in zip(effect.adjustable, symbols, strict=True):
+            name, (inside, _, last) = f"{title(effect, i)}_{one.replace('.', '_')}", one.rpartition(".")
             known = documented(type(at(effect, inside) if inside else effect).__doc__)
             sizes[name] = symbol.numel()
             terms[name] = Term(known[last].unit if last in known else "", f"{last} of {type(effect).__name__}")
