@@ -24,6 +24,7 @@ LAYERS = [
     ["scene"],
     ["motion"],
     ["guess", "results", "flights"],
+    ["ipopt"],
     ["nlp"],
     ["diagnosis"],
     ["solver", "checks"],

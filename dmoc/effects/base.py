@@ -14,8 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from dmoc.basics.docstrings import documented, first_line
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties, documented, first_line
 from dmoc.basics.unknown import open_fields
 
 

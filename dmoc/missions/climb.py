@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.diagnosis.legs import mission_cause
+from dmoc.ipopt.options import NEAR
+from dmoc.ipopt.run import Answer, Interrupt, Watch
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
 from dmoc.missions.path import MissionPath, cold
@@ -18,8 +20,6 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
-from dmoc.nlp.ipopt import Answer, Interrupt, Watch
-from dmoc.nlp.ipopt_options import NEAR
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
@@ -123,7 +123,7 @@ class Climb:
             name, size = (program.name_of(*worst[0][1:]), worst[0][0]) if worst else ("", 0.0)
             return bool(self.progress(*program.numerics, iteration, cost, name, size))
 
-        return Watch(*program.sizes, tell if self.progress else None, self.interrupt)
+        return Watch(tell if self.progress else None, self.interrupt)
 
     def from_guess(self, path: MissionPath) -> Attempt:
         """The first answer: |F| rounded widely at first, and other durations where that fails."""

@@ -22,7 +22,8 @@ from dmoc.legs.legs import Joint
 from dmoc.missions.path import MissionPath
 from dmoc.missions.within import Placed
 from dmoc.motion.dynamics import Dynamics
-from dmoc.nlp.assembly import Block, kernel
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake, values_of, with_symbols

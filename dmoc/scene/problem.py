@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.basics.duties import Named
+from dmoc.basics.docstrings import Named
 from dmoc.configurations.of_problem import free_configuration, unknown_parts
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.ipopt.run import Answer
 from dmoc.missions.path import MissionPath
 from dmoc.missions.program import MissionProgram
 from dmoc.missions.within import Placed, leg_program
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
 from dmoc.teams.between import BetweenBodies
