@@ -25,7 +25,7 @@ SHOWN = {page: text for page, text in PAGES.items() if page not in ("README", "e
 FRONT = sections(PAGES["README"])
 COMMANDS, SCENE = "Two commands", "A scene in ten lines"
 # Some pages need a package that comes with an extra; whoever runs the tests without has none of it.
-NEEDED = {"report": "plotly"}
+NEEDED = {"report": "plotly", "effects": "pymsis"}
 
 
 def of_page(name):
@@ -76,6 +76,7 @@ ELSEWHERE = {
     "python scripts/accuracy.py --write": "it writes the page, in minutes",
     "python scripts/benchmark.py --peers --write": "likewise; tests/studies/test_peers.py runs its parts",
     "python scripts/campaign.py --each 50 --journal campaign.jsonl --write": "it takes an hour",
+    "python scripts/identification.py": "it takes minutes and the extra study; tests hold what it shows",
     "python scripts/gallery.py": "it writes the pictures; tests/scene/test_problems.py solves every problem",
 }
 # Commands within a line of text that name all they need; those of the gallery are run by the tests of problems.
