@@ -19,9 +19,9 @@ from peers.tasks import TASKS
 ACCURACIES = (1e-3, 1e-5, 1e-7)
 # Names of the tools in the table, in its order.
 TOOLS = {"asset": "ASSET", "casadi": "CasADi by hand", "dmoc": "dmoc"}
-# Solves after the first in a process whose times count as warm: so many, but one where it took longer than
-# BRIEF [s].
-WARM, BRIEF = 2, 0.2
+# Solves after the first in a process whose median counts as warm, fewer where they take long; and those of
+# which the fastest says what a mesh costs when one is chosen.
+WARM, CHOOSING = 2, 5
 # A run that takes longer than this [s] does not count.
 PATIENCE = 60
 # Solves that take longer than this [s] are timed in the first LEAST turns alone.
@@ -99,14 +99,16 @@ class Bench:
         return found["seconds"], Answer.of(found["answer"])
 
     def tried(self, tool: str, task: str) -> list[tuple[float, Run]]:
-        """Meshes of the short list up to the best accuracy, with the time of one warm solve [s]."""
+        """Meshes of the short list up to the best accuracy, with the time of a warm solve [s]."""
         runs: list[tuple[float, Run]] = []
         for mesh in MESHES[tool][task]:
             if any(run.error <= ACCURACIES[-1] for _, run in runs):
                 break
-            if (found := self.once(tool, task, mesh, 1)) is not None:
+            if (found := self.once(tool, task, mesh, CHOOSING)) is not None:
                 seconds, answer = found
-                runs.append((seconds[-1], Run(tool, task, mesh, error(TASKS[task], answer), answer.status)))
+                runs.append(
+                    (min(seconds[1:]), Run(tool, task, mesh, error(TASKS[task], answer), answer.status))
+                )
                 self.told(f"{tool:7} {task} {named(tool, mesh):32} error {runs[-1][1].error:.1e}")
         return runs
 
@@ -116,8 +118,7 @@ class Bench:
             for run in runs:
                 if turn >= LEAST and run.first and median(run.first) > SLOW:
                     continue
-                again = 1 if run.first and run.first[-1] > BRIEF else WARM
-                if (found := self.once(run.tool, run.task, run.mesh, again)) is not None:
+                if (found := self.once(run.tool, run.task, run.mesh, WARM)) is not None:
                     run.first.append(found[0][0])
                     run.warm.append(median(found[0][1:]))
             self.told(f"turn {turn + 1} of {repeats}")
