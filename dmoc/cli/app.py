@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from dmoc.cli import disperse as disperse_command
+from dmoc.cli import flights as flights_command
 from dmoc.cli import pages as pages_command
 from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
@@ -163,7 +163,12 @@ def check(file: File, source: Source = None, worth: Worth = False, as_json: Json
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
 def plot(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help=f"{SAVED}, the result of a sweep, or a point of it: map.nc:duration=12."
+        ),
+    ],
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
     source: Source = None,
     dark: pages_command.Dark = False,
@@ -173,7 +178,10 @@ def plot(
     from dmoc.sweeps import data as sweep_data
 
     target = file.with_suffix(".png") if out is None else out
-    if sweep_data.is_sweep(file):
+    if (chosen := pages_command.point_of(file, out)) is not None:
+        solution, target = chosen
+        pages_command.draw(solution, target, dark=dark)
+    elif sweep_data.is_sweep(file):
         from dmoc.charts.sweep import save_sweep
 
         writable(target, drawn=True)
@@ -248,8 +256,12 @@ for _verb, _example in (
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
     (
-        disperse_command.disperse,
+        flights_command.disperse,
         "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
+    (
+        flights_command.identify,
+        "dmoc identify free_flyer --unknown mass=10 --unknown drag=1 --unknown offset --noise 0.001",
     ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),

@@ -10,7 +10,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number, short, vector
 from dmoc.effects.base import Force, Part
-from dmoc.effects.user_functions import as_column, tried
+from dmoc.effects.user_functions import as_column, is_zero, tried
 
 # Drag computes the speed |w| against the air as sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], which has derivatives of
 # every order at rest too; a micrometre a second changes no force that matters.
@@ -99,7 +99,7 @@ class UniformAtmosphere(Atmosphere):
         checked(
             self,
             density=number("density", self.density, "kg/m^3", nonnegative=True),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
 
     def check_dimension(self, dimension: int) -> None:
@@ -157,7 +157,7 @@ class ExponentialAtmosphere(Atmosphere):
             scale_height=number("scale_height", self.scale_height, "m", positive=True),
             radius=number("radius", self.radius, "m", positive=True),
             rate=number("rate", self.rate, "rad/s"),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
         if self.height >= self.radius:
             raise ValueError(
@@ -183,7 +183,7 @@ class ExponentialAtmosphere(Atmosphere):
 
     def velocity_at(self, t: Any, q: Any) -> Any:
         drift = 0 if self.wind is None else self.wind.velocity(t, q)
-        if self.rate == 0:
+        if is_zero(self.rate):
             return drift
         return drift + self.rate * ca.vertcat(-q[1], q[0], *([0] if q.numel() == 3 else []))
 
@@ -257,7 +257,7 @@ class LinearDrag(Force):
         checked(
             self,
             coefficient=number("coefficient", self.coefficient, "N s/m", nonnegative=True),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
 
     def check_dimension(self, dimension: int) -> None:
@@ -268,5 +268,5 @@ class LinearDrag(Force):
         return -self.coefficient * (v if self.wind is None else v - self.wind.velocity(t, q))
 
 
-def _wind(value: Any) -> Wind | None:
+def checked_wind(value: Any) -> Wind | None:
     return value if value is None or isinstance(value, Wind) else Wind(value)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, checked, entries, same_length, vector
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.parts.rows import Row
 
 
@@ -70,6 +70,11 @@ class Boundary(Duties):
     def has_position(self) -> bool:
         """Whether it says where the body is; an attitude alone does not."""
         return True
+
+    @property
+    def motion(self) -> Any:
+        """A function of the time [s] that gives the place [m] where it moves along a known path, else None."""
+        return None
 
     @property
     def turns_body(self) -> bool:
