@@ -27,6 +27,7 @@ LAYERS = [
     ["nlp"],
     ["diagnosis"],
     ["solver", "checks"],
+    ["chains"],
     ["missions"],
     ["teams"],
     ["structure"],

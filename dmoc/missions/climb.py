@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import MissionPath, cold
+from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
-from dmoc.missions.path import MissionPath, cold
-from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh

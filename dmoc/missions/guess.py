@@ -12,12 +12,12 @@ import numpy as np
 from dmoc.basics.arguments import both_ends, short
 from dmoc.basics.plain import unbroken
 from dmoc.basics.quaternions import in_one_sign, normalised
+from dmoc.chains.path import MissionPath
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.missions.arcs import cheapest_arc
-from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath

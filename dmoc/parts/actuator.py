@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -229,6 +230,17 @@ class Actuator(ABC):
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value * (self.force_limit() or 1.0), "N"
+
+    def limit_names(self, dimension: int) -> tuple[tuple[str, str], ...]:
+        """What it does at the lower and the upper side of each of its limits, in a word; "" where there is none.
+
+        Empty for an actuator that cannot be told to keep to a limit; see `kept`.
+        """
+        return ()
+
+    def kept(self, sides: Sequence[int]) -> Actuator:
+        """The actuator that keeps exactly to some of the limits in `limit_names`: -1 lower, 1 upper, 0 neither."""
+        raise ValueError(f"{type(self).__name__} has no limits to keep to")
 
     def beyond(self, u: np.ndarray) -> np.ndarray:
         """By how much controls between nodes are beyond what it can do [N], shape (count,).

@@ -76,8 +76,8 @@ def _flights(mission: Mission, solution: MissionSolution) -> Iterator[Trajectory
 
 def _behind(joint: Joint, solution: MissionSolution, dynamics: Dynamics, state: tuple) -> tuple:
     """Position, independent velocities and mass behind the events of a joint."""
+    from dmoc.chains.path import own_parts
     from dmoc.legs.events import Instant
-    from dmoc.missions.path import own_parts
 
     time, q, v, mass = state
     speeds = dynamics.configuration.coordinates.speeds

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.missions.path import MissionPath
-from dmoc.missions.program import MissionProgram
-from dmoc.missions.within import Placed, leg_program
+from dmoc.chains.path import MissionPath
+from dmoc.chains.program import MissionProgram
+from dmoc.chains.within import Placed, leg_program
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.units import units_of

@@ -86,6 +86,19 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
         _leave(program, legs[index - 1].program.problem, 0, sides)
     if index + 1 < len(legs):
         _leave(program, legs[index + 1].program.problem, -1, sides)
+    for place, joint in ((0, mission.joints[index]), (-1, mission.joints[index + 1])):
+        for event in joint.events:
+            if event.continued and event.left_behind == (place == -1):
+                _leave_controls(program, event.continued, place, sides)
+
+
+def _leave_controls(program: Program, which: tuple[int, ...], place: int, sides: list[np.ndarray]) -> None:
+    """Leave the limits of controls at the first or last node of a leg to the leg beside it, where they go on."""
+    at = program.columns["force"].indices[list(which), place]
+    sides[0][at], sides[1][at] = -np.inf, np.inf
+    for group in program.rows.groups:
+        if group.kind == "control" and group.owner and group.owner.field == "actuator":
+            sides[2][group.indices[:, place]], sides[3][group.indices[:, place]] = -np.inf, np.inf
 
 
 def _leave(program: Program, beside: TransferProblem, place: int, sides: list[np.ndarray]) -> None:
