@@ -182,15 +182,17 @@ class Climb:
         return again if again.solved else attempt
 
     def refined(
-        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE
+        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE, still: float = np.inf
     ) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
 
-        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum.
+        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective by
+        about the part `still` of it.
         """
         error, changes, errors = None, [], self._errors(attempt)
-        for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
-            if tol is None and _largest(errors) <= accurate:
+        few = tol is None and np.isinf(still)
+        for _ in range(MOST_MENDED if few else MOST_MESHES):
+            if tol is None and _largest(errors) <= accurate and (not changes or _left(changes) <= still):
                 break
             onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:

@@ -232,14 +232,14 @@ class Actuator(ABC):
         return value * (self.force_limit() or 1.0), "N"
 
     def limit_names(self, dimension: int) -> tuple[tuple[str, str], ...]:
-        """What it does at the lower and the upper side of each of its limits, in a word; "" where there is none.
+        """What it does at the lower and the upper side of each of its limits, "" where there is none.
 
         Empty for an actuator that cannot be told to keep to a limit; see `kept`.
         """
         return ()
 
     def kept(self, sides: Sequence[int]) -> Actuator:
-        """The actuator that keeps exactly to some of the limits in `limit_names`: -1 lower, 1 upper, 0 neither."""
+        """The actuator that keeps exactly to some of its `limit_names`: -1 the lower one, 1 the upper, 0 none."""
         raise ValueError(f"{type(self).__name__} has no limits to keep to")
 
     def beyond(self, u: np.ndarray) -> np.ndarray:

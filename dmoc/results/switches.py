@@ -44,6 +44,13 @@ def has_linear_controls(problem: TransferProblem) -> bool:
     return bool(_linear(problem, problem.controls).any())
 
 
+def linear_controls(problem: TransferProblem) -> np.ndarray:
+    """Which controls the cost is linear in, whether or not each has limits of its own."""
+    u = ca.SX.sym("u", problem.controls)
+    curved = ca.sum2(ca.hessian(_rate(problem, u), u)[0])
+    return np.array([not curved.sparsity().has_nz(i, 0) for i in range(problem.controls)])
+
+
 def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """When a control that the cost is linear in passes the middle between its limits [s]."""
     fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
@@ -68,9 +75,13 @@ def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
 def _linear(problem: TransferProblem, size: int) -> np.ndarray:
     """Which controls have limits on both sides and a cost that is linear in them."""
     u = ca.SX.sym("u", size)
-    rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    return np.isfinite(upper - lower) & (ca.hessian(rate, u)[0].nnz() == 0)
+    return np.isfinite(upper - lower) & (ca.hessian(_rate(problem, u), u)[0].nnz() == 0)
+
+
+def _rate(problem: TransferProblem, u: ca.SX) -> ca.SX:
+    """What the objective integrates, as an expression of the controls."""
+    return ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
 
 
 def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:

@@ -23,6 +23,7 @@ from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
+from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
 # |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer.
@@ -47,6 +48,9 @@ WORSE = 0.1
 MOST_ITERATIONS = 200
 # Without a tolerance, legs are refined until their steps err by less than this part of the path [-].
 ACCURATE = 1e-9
+# Nor may the objective change by more than this part of it [-]: what steps err by says nothing of how well the
+# controls follow a fast turn of the thrust.
+STILL = 1e-9
 
 
 @unchanged()
@@ -69,7 +73,7 @@ def solve_by_structure(
     if not coarse.success:
         return coarse if coarse.status in ENDED else None
     arcs, legs = arcs_of(coarse), (coarse,)
-    if len(arcs) == 1:
+    if len(arcs) == 1 and arcs[0].alike == (FREE, None):
         return None
     numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
     climb = Climb(mission_of(problem, arcs), *numerics)
@@ -124,7 +128,7 @@ def coarse_answer(problem: TransferProblem, order: int | None, steps: int | None
 def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
     """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
     lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
-    return f"{len(arcs)} legs: {', '.join(lengths)}"
+    return f"{len(arcs)} leg{'s' * (len(arcs) > 1)}: {', '.join(lengths)}"
 
 
 def verdict(found: MissionSolution) -> Report:
@@ -182,4 +186,4 @@ def _finished(climb: Climb, problem: TransferProblem, attempt: Attempt, tol: flo
         onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
         finer = climb.attempt(onto, carried=True)
         attempt = finer if finer.solved else attempt
-    return answered(climb, *climb.refined(attempt, tol, ACCURATE), tol)
+    return answered(climb, *climb.refined(attempt, tol, ACCURATE, STILL), tol)
