@@ -115,6 +115,8 @@ def _places(
     if given is not None:
         known, values = given
         return lambda times: np.stack([np.interp(times, known, column) for column in values.T], axis=1)
+    if mission.closes and (around := _around(mission, float(begins[0]), float(durations.sum()))) is not None:
+        return around
     knots = _known(mission, begins)
     found = []
     for (first, start), (last, goal) in pairwise(knots):
@@ -126,6 +128,22 @@ def _places(
     times = np.concatenate([part for part, _ in found])
     values = np.concatenate([part for _, part in found])
     return lambda at: np.stack([np.interp(at, times, column) for column in values.T], axis=1)
+
+
+def _around(mission: Mission, begin: float, period: float) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The circle around a lone attractor that closes in a time [s], for a closed path whose places are open."""
+    attractor, axes = mission.stretches[0].attraction.lone, mission.dimension
+    if attractor is None or axes < 2 or not np.isnan(mission.start.estimate(begin)[0]).all():
+        return None
+    center, rate = attractor.place(axes), 2 * np.pi / period
+    radius = (attractor.mu / rate**2) ** (1 / 3)
+
+    def places(times: np.ndarray) -> np.ndarray:
+        angles = rate * (times - begin)
+        flat = np.zeros((len(times), axes - 2))
+        return center + np.column_stack([radius * np.cos(angles), radius * np.sin(angles), flat])
+
+    return places
 
 
 def _known(mission: Mission, begins: np.ndarray) -> list[tuple[int, Any]]:
