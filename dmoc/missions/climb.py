@@ -35,6 +35,8 @@ MOST_TRYING = 200
 ACCURATE, MOST_MENDED = 1e-5, 3
 # Near to the answer Ipopt is asked for this [-]: at limits the barrier leaves an error of that size.
 SHARP = 1e-12
+# There a step must not break the rows by more than this many times what the path breaks, or than one scaled [-].
+STAYING = 1.0
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -67,6 +69,8 @@ class Climb:
 
     # What sees it as Ipopt does.
     program: Any = MissionProgram
+    # Whether all attempts are to be as sharp as those from nearly the answer.
+    sharp = False
 
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
@@ -96,8 +100,11 @@ class Climb:
         program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
+        if self.sharp:
+            limits["ipopt.tol"] = SHARP
         if near is not None:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
+            limits["ipopt.theta_max_fact"] = STAYING
         built = time.perf_counter() - begun
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:

@@ -53,7 +53,7 @@ def is_switched(problem: TransferProblem) -> bool:
 def arcs_of(solution: Solution) -> tuple[Arc, ...]:
     """The arcs of an answer on a coarse mesh."""
     problem, path = solution.require_problem(), solution.path
-    cuts = _switches(problem, path) if is_switched(problem) else _limits_kept(problem, path)
+    cuts = _switches(problem, path) if is_switched(problem) else _limits_kept(solution)
     marks: list[tuple[float, float, Surface]] = []
     for surface, acts in touched(problem, path, ACTS * abs(solution.objective)).items():
         marks += [(*span, surface) for span in spans_of(path, acts)]
@@ -79,11 +79,12 @@ def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, f
     return [*found, (str(kinds[-1]), 1.0)]
 
 
-def _limits_kept(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, float]]:
+def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
     """The limits that controls keep to and the fractions at which that changes."""
+    problem, path = solution.require_problem(), solution.path
     if not names_of(problem):
         return [(FREE, 1.0)]
-    kinds, at = kinds_along(problem, path), path.fractions
+    kinds, at = kinds_along(problem, path, ACTS * abs(solution.objective)), path.fractions
     found = []
     for node in runs_of(kinds):
         part = switch(problem, path, node)
@@ -104,7 +105,8 @@ def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) 
     places: list[tuple[float, Surface | None]] = [(end, None) for _, end in cuts]
     follows: list[tuple[float, float, Surface]] = []
     for first, last, surface in marks:
-        if last - first > FOLLOWED_STEPS * step:
+        # Nothing keeps a coast at a limit: what looks like that is a touch.
+        if last - first > FOLLOWED_STEPS * step and COAST not in _kinds_within(cuts, first, last):
             follows.append((first, last, surface))
             places += [(first, surface), (last, surface)]
         else:
@@ -117,6 +119,12 @@ def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) 
         arcs.append(Arc(kind, end, along, touch))
         begin = end
     return tuple(arcs)
+
+
+def _kinds_within(cuts: list[tuple[str, float]], first: float, last: float) -> set[str]:
+    """The kinds of arcs between two fractions of the duration."""
+    begins = [0.0, *(end for _, end in cuts)]
+    return {kind for (kind, end), begin in zip(cuts, begins, strict=False) if begin < last and end > first}
 
 
 def alike(one: Sequence[Arc], other: Sequence[Arc]) -> bool:

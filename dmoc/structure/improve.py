@@ -20,6 +20,8 @@ EMPTY = 1.5
 WRONG = 1e-6
 # It is in doubt up to this many times what it is at a switch, where it should be zero [-].
 DOUBT = 10.0
+# An arc between two touches of a limit is at it throughout if it is within this part of all the room [-].
+SAME = 1e-5
 # A new arc begins with this part of the whole duration on either side of where that is furthest wrong [-]: a
 # longer one leads away from the answer so far.
 NEW = 1e-3
@@ -60,7 +62,8 @@ def _other_limits(
     """The arcs with one more, in which controls keep to other limits, or None where none lacks."""
     if not names_of(problem):
         return None
-    lacks = lacking(problem, [arc.kind for arc in arcs], [leg.path for leg in found.legs])
+    least = ACTS * abs(found.objective)
+    lacks = lacking(problem, [arc.kind for arc in arcs], [leg.path for leg in found.legs], least)
     if lacks is None:
         return None
     index, kind, wrong = lacks
@@ -103,7 +106,10 @@ def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSol
             rooms = [
                 room(problem, leg.path, surface, leg.path.fractions, leg.path.position) for leg in found.legs
             ]
-            if np.abs(rooms[i + 1]).max() < NEAR * np.ptp(np.concatenate(rooms)):
+            most, whole = float(np.abs(rooms[i + 1]).max()), float(np.ptp(np.concatenate(rooms)))
+            leg = found.legs[i + 1]
+            broken = any(one == surface for _, one in pierced(problem, leg.path, leg.provenance.start_time))
+            if most < SAME * whole or (broken and most < NEAR * whole):
                 left[i + 1] = two._replace(follows=surface)
     if tuple(left) == arcs:
         return arcs

@@ -66,10 +66,21 @@ def pushing(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     return np.zeros((len(path.control), len(names_of(problem)))) if found is None else found
 
 
-def kinds_along(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
-    """What the controls do at each node, as kinds of arcs."""
-    names, push = names_of(problem), pushing(problem, path)
-    sides = np.sign(push) * (np.abs(push) > PUSHES * np.abs(push).max(initial=np.finfo(float).tiny))
+def _acting(problem: TransferProblem, path: DiscretePath, least: float) -> np.ndarray:
+    """Which limits act at which nodes: loosening them by their own size changes the objective by `least`."""
+    push = np.abs(pushing(problem, path))
+    size = 1.0 if are_rows(problem) else problem.actuator.bounds(problem.dimension)[1]
+    return (push * size / len(push) > least) & (push > PUSHES * push.max(initial=0.0))
+
+
+def kinds_along(problem: TransferProblem, path: DiscretePath, least: float) -> np.ndarray:
+    """What the controls do at each node, as kinds of arcs.
+
+    A limit of controls that do not jump acts if loosening it by its own size would change the objective by more
+    than `least`.
+    """
+    names = names_of(problem)
+    sides = np.sign(pushing(problem, path)) * _acting(problem, path, least)
     shares = _shares(problem, path)
     for i in np.flatnonzero(is_linear(problem)):
         sides[:, i] = np.where(shares[:, i] > 0, 1, -1 if names[i][0] else 0)
@@ -167,12 +178,12 @@ def continued(problem: TransferProblem, one: str, other: str) -> Iterator[Contin
 
 
 def lacking(
-    problem: TransferProblem, kinds: Sequence[str], paths: Sequence[DiscretePath]
+    problem: TransferProblem, kinds: Sequence[str], paths: Sequence[DiscretePath], least: float
 ) -> tuple[int, str, np.ndarray] | None:
     """The leg in which another limit is kept to, what its controls do there, and by how much at its nodes.
 
     A limit that is kept to is in the way where its multiplier has the sign of the other side; one that is not
-    kept to is to be where it acts.
+    kept to is to be where it acts, by `least` as in `kinds_along`.
     """
     names = names_of(problem)
     pushes = [pushing(problem, path) for path in paths]
@@ -182,6 +193,7 @@ def lacking(
         sides = sides_of(problem, kind)
         for limit, side in enumerate(sides):
             wrong = np.maximum(-side * push[:, limit], 0.0) if side else np.abs(push[:, limit])
+            wrong = np.where(_acting(problem, paths[i], least)[:, limit], wrong, 0.0)
             wrong[[0, -1]] = 0.0
             if np.sum(wrong > WRONG_SIDE * largest) < WRONG_NODES or wrong.max() <= most:
                 continue
