@@ -107,6 +107,7 @@ if TYPE_CHECKING:
     from dmoc.motion.march import Trajectory as Trajectory
     from dmoc.nlp.solving import NLP as NLP
     from dmoc.nlp.transcription import transcribe as transcribe
+    from dmoc.pages.report import report as report
     from dmoc.parts.actuator import Actuator as Actuator
     from dmoc.parts.constraint import Constraint as Constraint
     from dmoc.parts.detours import KeepOut as KeepOut

@@ -28,7 +28,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import TARGETS, time_to_reach, work_precision
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
 PLACE = re.compile(r"(?<=<!-- accuracy -->\n).*?(?=<!-- end of accuracy -->)", re.DOTALL)
 HEAD = "| problem | how | " + " | ".join(f"{target:.0e}" for target in TARGETS) + " |\n"
 HEAD += "|---" * (2 + len(TARGETS)) + "|\n"
@@ -121,8 +121,8 @@ def rows(name: str) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--readme", action="store_true", help="write the table into the README")
-    into_readme, begun, text = parser.parse_args().readme, time.perf_counter(), HEAD
+    parser.add_argument("--write", action="store_true", help="write the table into docs/accuracy.md")
+    into_page, begun, text = parser.parse_args().write, time.perf_counter(), HEAD
     print(HEAD, end="")
     for name in PROBLEMS:
         found = "".join(rows(name))
@@ -131,8 +131,8 @@ def main() -> None:
     machine = f"{os.cpu_count()} shared cores, {platform.machine()}, Python {platform.python_version()}"
     note = f"\nMedians of {REPEATS} on {machine}.\n"
     print(f"{note}{time.perf_counter() - begun:.0f} s in all")
-    if into_readme:
-        README.write_text(PLACE.sub(lambda _: text + note, README.read_text()))
+    if into_page:
+        PAGE.write_text(PLACE.sub(lambda _: text + note, PAGE.read_text()))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     ./scripts/run python scripts/campaign.py                     # the table, ten scenes a family
     ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl  # goes on where it was ended
     ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl --again   # what was not green
-    ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl --readme  # into the README
+    ./scripts/run python scripts/campaign.py --each 50 --journal campaign.jsonl --write  # into docs/campaign.md
     ./scripts/run python scripts/campaign.py --family orbits --seed 3     # one scene, with what is said of it
 
 Green: solved, and every check of `verify` holds; or, where a scene is impossible, a failure that names a
@@ -31,7 +31,7 @@ from campaign.making import Scene
 
 from dmoc import solve, verify
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "campaign.md"
 PLACE = re.compile(r"(?<=<!-- campaign -->\n).*?(?=<!-- end of campaign -->)", re.DOTALL)
 HEAD = "| scenes | number | green | red | wrong | median s | worst s |\n|---|---|---|---|---|---|---|\n"
 # Seconds of processor time after which a solve is ended: a scene that takes longer counts as red.
@@ -163,7 +163,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, help="this scene alone")
     parser.add_argument("--journal", type=Path, help="keep outcomes in this file, and take known ones from it")
     parser.add_argument("--again", action="store_true", help="run anew what is not green in the journal")
-    parser.add_argument("--readme", action="store_true", help="write the table into the README")
+    parser.add_argument("--write", action="store_true", help="write the table into docs/campaign.md")
     given = parser.parse_args()
     families = [given.family] if given.family else list(FAMILIES)
     seeds = range(given.first, given.first + given.each) if given.seed is None else [given.seed]
@@ -173,8 +173,8 @@ def main() -> int:
         if one.verdict != "green" or given.seed is not None:
             print(f"{one.family} {one.seed}: {one.verdict}, {one.seconds:.1f} s, {one.why}", flush=True)
     print(found := table(outcomes), end="")
-    if given.readme:
-        README.write_text(PLACE.sub(lambda _: found, README.read_text()))
+    if given.write:
+        PAGE.write_text(PLACE.sub(lambda _: found, PAGE.read_text()))
     return int(any(one.verdict == "wrong" for one in outcomes))
 
 

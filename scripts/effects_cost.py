@@ -1,7 +1,7 @@
 """What each further effect costs: instructions, iterations and time of one transfer around the Earth.
 
     ./scripts/run python scripts/effects_cost.py              # the table
-    ./scripts/run python scripts/effects_cost.py --readme     # and write it into the README
+    ./scripts/run python scripts/effects_cost.py --write     # and write it into docs/effects.md
 
 The transfer is that of leo_raise from its start to a fixed place on its goal orbit, with a free force at
 least effort, so that every scene, also the one without any effect, takes a handful of iterations.
@@ -32,7 +32,7 @@ from dmoc.basics.memory import forget
 from dmoc.nlp.stencils import stencils_of
 from dmoc.scene.problem_file import load_problem
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "effects.md"
 PLACE = re.compile(r"(?<=<!-- effects -->\n).*?(?=<!-- end of effects -->)", re.DOTALL)
 # Every scene is solved at this order, at which a step has the most nodes.
 ORDER = 8
@@ -97,12 +97,12 @@ def rows() -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--readme", action="store_true", help="write the table into the README")
-    into_readme = parser.parse_args().readme
+    parser.add_argument("--write", action="store_true", help="write the table into docs/effects.md")
+    into_page = parser.parse_args().write
     table = HEAD + "".join(rows())
     print(table, end="")
-    if into_readme:
-        README.write_text(PLACE.sub(lambda _: table, README.read_text()))
+    if into_page:
+        PAGE.write_text(PLACE.sub(lambda _: table, PAGE.read_text()))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Solve the problems whose optimum is published or known in closed form, and print how far off the answers are.
 
     ./scripts/run python scripts/references.py                # the table
-    ./scripts/run python scripts/references.py --readme       # and write it into the README
+    ./scripts/run python scripts/references.py --write       # and write it into docs/references.md
 
 Half a minute. The exit code is 1 if an answer is further from its reference than its row allows.
 """
@@ -16,7 +16,7 @@ from dmoc import solve
 from dmoc.results.solution import Solution
 from dmoc.scene.problem_file import load_problem
 
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "references.md"
 PLACE = re.compile(r"(?<=<!-- references -->\n).*?(?=<!-- end of references -->)", re.DOTALL)
 HEAD = "| problem | quantity | here | reference | relative difference | order, steps | source |\n"
 HEAD += "|---|---|---|---|---|---|---|\n"
@@ -130,8 +130,8 @@ fourteen starts six end there or near, most at this transfer, which is 0.98420 w
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--readme", action="store_true", help="write the table into the README")
-    into_readme = parser.parse_args().readme
+    parser.add_argument("--write", action="store_true", help="write the table into docs/references.md")
+    into_page = parser.parse_args().write
     print(HEAD, end="")
     lines, worst = [], 0
     for known in TABLE:
@@ -140,9 +140,9 @@ def main() -> int:
         print(lines[-1], end="", flush=True)
         worst |= abs(known.difference(solution)) > known.tolerance
     print(NOTES, end="")
-    if into_readme:
-        text = README.read_text()
-        README.write_text(PLACE.sub(lambda _: HEAD + "".join(lines) + NOTES, text))
+    if into_page:
+        text = PAGE.read_text()
+        PAGE.write_text(PLACE.sub(lambda _: HEAD + "".join(lines) + NOTES, text))
     return worst
 
 

@@ -5,7 +5,7 @@ import shlex
 import subprocess
 import sys
 
-COMMAND = r"^ {4}\./scripts/run dmoc (?P<command>[^\n]*)$"
+COMMAND = r"^ {4}(?:\./scripts/run )?dmoc (?P<command>[^\n]*)$"
 BLOCK = r"(?P<before>[^\n]*)\n\n```python\n(?P<source>.*?)^```$"
 
 
@@ -24,10 +24,12 @@ def play(text, folder, monkeypatch):
     """Run all there is in a text, in its order and in a folder; the names that its Python has then."""
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
-    names = {"__name__": "shown"}
+    names = {"__name__": "shown", "printed": {}}
     for part in parts(text):
-        if part["command"]:
-            run(part["command"], folder)
+        if command := part["command"]:
+            # a command that is shown in two spellings is run once
+            if command not in names["printed"]:
+                names["printed"][command] = run(command, folder)
             continue
         if saved := re.search(r"Save this as\s`(\S+)`", part["before"]):
             (folder / saved[1]).write_text(part["source"])
@@ -43,6 +45,7 @@ def run(line, folder):
     assert (ended.returncode, ended.stderr) == (0, ""), f"{line}\n{ended.stdout}{ended.stderr}"
     for written in re.findall(r"--(?:out|plot) (\S+)", line):
         assert (folder / written).stat().st_size > 1000, line
+    return ended.stdout
 
 
 def endings(text):
@@ -57,9 +60,11 @@ def ends_with(command, shown):
     assert ended.returncode == 3 and " ".join(ended.stdout.split()).endswith(shown), ended.stdout
 
 
-def all_is_run(text, least):
-    """Every fenced block and every line with a command is a part of a section."""
-    blocks = text.count("```python")
-    commands = re.findall(r"^\s*\./scripts/run\s+dmoc", text, re.MULTILINE)
-    assert text.count("```") == 2 * blocks
-    assert sum(len(parts(part)) for part in sections(text).values()) == blocks + len(commands) > least
+def all_is_run(text):
+    """Every fenced block of Python and every line with a command is a part of a section; how many there are."""
+    fences = re.findall(r"^```(\w*)$", text, re.MULTILINE)
+    blocks = fences.count("python")
+    commands = re.findall(r"^[ \t]+(?:\./scripts/run )?dmoc \w", text, re.MULTILINE)
+    assert set(fences) <= {"", "python", "math"} and 2 * fences.count("") == len(fences)
+    assert sum(len(parts(part)) for part in sections(text).values()) == blocks + len(commands)
+    return blocks + len(commands)

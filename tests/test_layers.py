@@ -35,6 +35,7 @@ LAYERS = [
     ["studies", "sweeps", "exports", "conversions", "answers", "sensitivity"],
     ["plots", "reports"],
     ["charts", "films"],
+    ["pages"],
     ["notebook"],
     ["cli"],
 ]

@@ -10,7 +10,7 @@ import pytest
 import dmoc
 
 FOLDER = Path(dmoc.__file__).parents[1] / "docs" / "notebooks"
-README = (FOLDER.parents[1] / "README.md").read_text()
+PAGE = (FOLDER.parent / "notebook.md").read_text()
 BOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
@@ -43,6 +43,6 @@ def test_a_notebook_runs(path, tmp_path, monkeypatch, capsys):
     assert all(line.rstrip("\n") == line.rstrip() for cell in cells for line in cell["source"])
 
 
-def test_the_readme_names_them_all():
+def test_the_page_names_them_all():
     assert len(BOOKS) == 4
-    assert {path.name for path in BOOKS} == set(re.findall(r"docs/notebooks/(\w+\.ipynb)", README))
+    assert {path.name for path in BOOKS} == set(re.findall(r"\bnotebooks/(\w+\.ipynb)", PAGE))

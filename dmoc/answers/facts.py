@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dmoc.answers.along import least, pushes, swept
+from dmoc.answers.distances import from_attractors, from_zones
 from dmoc.answers.fact import Fact, Facts
 from dmoc.answers.orbits import osculating
 from dmoc.basics.digits import lasting, quantity
@@ -165,19 +165,11 @@ def _controls(solution: Any) -> list[Fact]:
 
 def _approaches(solution: Any) -> dict[Any, tuple[float, str, float]]:
     """The least distance from each attractor [m], when, and the radius of the attractor if it is known."""
-    problem, axes = solution.problem, solution.dimension
-    radius = max((effect.body_radius() for effect in problem.effects), default=0.0)
     found: dict[Any, tuple[float, str, float]] = {}
-    for source in problem.attraction.sources if axes else ():
-        center = source.place(axes)
-        size = radius if not center.any() else 0.0
-        distance, time = least(solution, partial(_distance, solution.path.coordinates, center))
-        found[tuple(center)] = distance, _when(solution, time), size
+    for center, (distance, radius) in from_attractors(solution).items():
+        closest, time = least(solution, distance)
+        found[center] = closest, _when(solution, time), radius
     return found
-
-
-def _distance(made: Any, center: np.ndarray, times: np.ndarray, q: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(q[:, made.places] - center, axis=1)
 
 
 def _approach(found: dict[Any, tuple[float, str, float]]) -> list[Fact]:
@@ -210,21 +202,13 @@ def _revolutions(angle: float | None) -> list[Fact]:
 
 def _clearances(solution: Any) -> list[tuple[float, str, str]]:
     """The least clearance from each zone [m], when, and the zone's name, between nodes too."""
-    made, found = solution.path.coordinates, []
-    for i, zone in enumerate(solution.problem.constraints):
-        here = partial(_clear, made, zone)
-        if here(solution.time[:1], solution.path.position[:1]) is not None:
-            distance, time = least(solution, here)
-            if abs(distance) <= NEAR * solution.path.diagonal:
-                distance = 0.0
-            found.append((distance, _when(solution, time), zone.named(i)))
+    found = []
+    for name, clear in from_zones(solution):
+        distance, time = least(solution, clear)
+        if abs(distance) <= NEAR * solution.path.diagonal:
+            distance = 0.0
+        found.append((distance, _when(solution, time), name))
     return found
-
-
-def _clear(made: Any, zone: Any, times: np.ndarray, q: np.ndarray) -> Any:
-    if zone.point is None and not zone.on:
-        return zone.clearance(times, q[:, made.places])
-    return zone.clearance(times, zone.seen_of(made, q, np.zeros((len(q), made.motions.size)))[0])
 
 
 def _when(solution: Any, time: float) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.files import as_path, whole_file
 from dmoc.plots.page import SUFFIXES
+from dmoc.plots.sheet import darken
 from dmoc.plots.style import DARK, SETTINGS, plain_numbers
 from dmoc.studies.accuracy import COLD, COMPILED, Trial
 
@@ -49,10 +50,12 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
     save_page(study_figure(trials, title), path)
 
 
-def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150) -> None:
+def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150, dark: bool = False) -> None:
     """Write a figure into a .png, .pdf or .svg file, whole or not at all; ValueError if it cannot be."""
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
+    if dark:
+        darken(page)
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.basics.files import whole_file
 from dmoc.charts.front import (
     FRONT,
     along,
@@ -20,6 +19,7 @@ from dmoc.charts.front import (
     unit_of,
     wide,
 )
+from dmoc.charts.study import save_page
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, WARNING, plain_numbers, readable
 from dmoc.sweeps.data import result
 
@@ -33,7 +33,7 @@ LEVELS = 8
 LABELLED = 12
 
 
-def save_sweep(data: Dataset, path: str | os.PathLike) -> None:
+def save_sweep(data: Dataset, path: str | os.PathLike, dark: bool = False) -> None:
     """Draw the result of a sweep into a file, whole or not at all.
 
     Parameters
@@ -42,10 +42,10 @@ def save_sweep(data: Dataset, path: str | os.PathLike) -> None:
         From `dmoc.sweep`, or read from its file.
     path : path
         Ends in .png, .pdf or .svg, which decides the format.
+    dark : bool
+        On a dark background.
     """
-    page = sweep_figure(data)
-    with whole_file(path) as temporary:
-        page.savefig(temporary, dpi=150)
+    save_page(sweep_figure(data), path, dark=dark)
 
 
 def sweep_figure(data: Dataset) -> Figure:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from dmoc.cli import disperse as disperse_command
+from dmoc.cli import pages as pages_command
 from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
 from dmoc.cli import stability as stability_command
@@ -49,8 +50,10 @@ USAGE_ERROR: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
-    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time.",
-    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed, 130 interrupted.",
+    help="Discrete mechanics and optimal control: move a body from A to B at least effort, fuel or time. "
+    "Begin with: dmoc solve free_flyer",
+    epilog="Exit codes: 0 all is well, 2 bad input, 3 not solved, 4 a check failed or a tolerance was missed, "
+    "130 interrupted.",
 )
 
 
@@ -118,7 +121,7 @@ def show(name: Name, settings: Settings = None) -> None:
     console.print(f"{file.path}; solve it with: dmoc solve {name}")
 
 
-app.command(epilog="Example: dmoc solve free_flyer --order 4 --set mass=12 --out flight.nc --plot flight.png")(
+app.command(epilog="Example: dmoc solve free_flyer --set mass=12 --tol 1e-4 --out flight.nc --plot flight.png")(
     solve_command.solve
 )
 
@@ -163,21 +166,21 @@ def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
     source: Source = None,
+    dark: pages_command.Dark = False,
 ) -> None:
     """Draw a saved solution, or the result of a sweep."""
     from dmoc.reports import words as report
     from dmoc.sweeps import data as sweep_data
 
     target = file.with_suffix(".png") if out is None else out
-    writable(target, drawn=True)
     if sweep_data.is_sweep(file):
         from dmoc.charts.sweep import save_sweep
 
-        save_sweep(sweep_data.read_sweep(file), target)
+        writable(target, drawn=True)
+        save_sweep(sweep_data.read_sweep(file), target, dark=dark)
     else:
-        from dmoc.plots.page import save_figure
-
-        save_figure(seen(file, source), target)
+        pages_command.drawable(target)
+        pages_command.draw(seen(file, source), target, dark=dark)
     report.console().print(f"wrote {target}")
 
 
@@ -241,6 +244,7 @@ def doctor() -> None:
 
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (pages_command.report, "dmoc report flight.nc --out flight.html"),
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
     (

@@ -65,32 +65,41 @@ Source = Annotated[
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the problem; repeat for more."),
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="A parameter of the problem, such as mass=12; repeat for more."
+    ),
 ]
 Order = Annotated[
     int | None,
-    typer.Option(help="2, 4, 6 or 8; if not given 2, in a solve around an attractor what that needs."),
+    typer.Option(help="Order of the scheme: 2, 4, 6 or 8; if not given, the default of the scene."),
 ]
 Steps = Annotated[
-    int | None, typer.Option(help="Number of steps, at least 2; 400, 100, 50, 32 at orders 2, 4, 6, 8.")
+    int | None,
+    typer.Option(help="Number of steps, at least 2; if not given 400, 100, 50 or 32 at order 2, 4, 6 or 8."),
 ]
 Version = Annotated[bool, switch("--version", callback=say_version, is_eager=True, help="Print the version.")]
 Structure = Annotated[
     bool | None,
     switch(
         "--structure/--no-structure",
-        help="Make burns, coasts and touches of a coarse answer legs with free ends; where --tol is below 1e-5 "
-        "it is tried.",
+        help="Make burns, coasts and touches of zones legs with free ends, for high accuracy; tried by itself "
+        "if --tol is below 1e-5.",
     ),
 ]
 Impulses = Annotated[
-    str | None, typer.Option(metavar="auto", help="As many impulses as help, in a mission that has some.")
+    str | None,
+    typer.Option(
+        metavar="auto", help="Find how many impulses of a mission cost least, beginning with those it has."
+    ),
 ]
 Worth = Annotated[
     bool,
-    switch("--worth", help="Also say what every number of the problem is worth: derivatives of the objective."),
+    switch(
+        "--worth",
+        help="Also say what each number of the problem is worth: the derivative of the objective by it.",
+    ),
 ]
-Hold = Annotated[bool, switch("--hold", help="Forces constant over each step.")]
+Hold = Annotated[bool, switch("--hold", help="Keep forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]
 
@@ -230,7 +239,9 @@ def fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def writable(path: Path | None, drawn: bool = False, table: bool = False, moving: bool = False) -> None:
+def writable(
+    path: Path | None, drawn: bool = False, table: bool = False, moving: bool = False, page: bool = False
+) -> None:
     """ValueError unless a file can be written there: said before the work, not after it.
 
     A result takes the place of another one, never that of a problem file or a thesis.
@@ -245,7 +256,11 @@ def writable(path: Path | None, drawn: bool = False, table: bool = False, moving
     special = path.exists() and not path.is_file()
     if special or not os.access(folder, os.W_OK):
         raise ValueError(f"cannot write {path}: choose a file in a folder you may write to")
-    if drawn:
+    if page:
+        from dmoc.pages.report import check_page
+
+        check_page(path)
+    elif drawn:
         from dmoc.plots.page import SUFFIXES
 
         if path.suffix.lower() not in SUFFIXES:

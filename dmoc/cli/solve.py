@@ -28,11 +28,12 @@ from dmoc.cli.options import (
     watched,
     writable,
 )
+from dmoc.cli.pages import Dark, draw, drawable
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
 Compiled = Annotated[
-    bool, switch("--compiled", help="Evaluate machine code, from the C compiler or as it was kept.")
+    bool, switch("--compiled", help="Evaluate machine code; needs a C compiler the first time.")
 ]
 
 
@@ -41,25 +42,32 @@ def solve(
     order: Order = None,
     steps: Steps = None,
     tol: Annotated[
-        float | None, typer.Option(help="Relative error to reach instead: order and steps follow from it.")
+        float | None,
+        typer.Option(help="Relative error to reach, such as 1e-4; order and steps follow from it."),
     ] = None,
     hold: Hold = False,
     settings: Settings = None,
     out: Annotated[Path | None, typer.Option(help="Save the solution here (netCDF).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the solution here (png, pdf or svg).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the solution here: png, pdf, svg, or html for a page.")
+    ] = None,
+    dark: Dark = False,
     animate: Annotated[Path | None, typer.Option(help="Write a moving picture here (gif or mp4).")] = None,
-    guess: Annotated[Path | None, typer.Option(help="A saved solution to start from.")] = None,
+    guess: Annotated[Path | None, typer.Option(help="Start from this saved solution.")] = None,
     starts: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=1000, help="Guesses to try on a coarse mesh; the best optimum is refined."
+            metavar="N",
+            min=1,
+            max=1000,
+            help="Try so many starting paths on a coarse mesh and refine the best optimum.",
         ),
     ] = 1,
     structure: Structure = None,
     impulses: Impulses = None,
     time_limit: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Seconds after which it ends with the best answer so far."),
+        typer.Option(metavar="S", help="End after so many seconds with the best answer so far."),
     ] = None,
     as_json: Json = False,
     compiled: Compiled = False,
@@ -70,7 +78,7 @@ def solve(
     import dmoc
 
     writable(out)
-    writable(plot, drawn=True)
+    drawable(plot)
     writable(animate, moving=True)
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
@@ -89,9 +97,7 @@ def solve(
     if out is not None:
         solution.save(out, source_hash=file.source_hash)
     if plot is not None:
-        from dmoc.plots.page import save_figure
-
-        save_figure(solution, plot, verdict)
+        draw(solution, plot, verdict, dark)
     if animate is not None:
         dmoc.animate(solution, animate)
     written = [path for path in (out, plot, animate) if path is not None]

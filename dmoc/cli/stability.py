@@ -20,9 +20,15 @@ if TYPE_CHECKING:
 
 
 def stability(
-    revolutions: Annotated[float, typer.Option(help="Of each orbit; 1000 for the figure of the README.")] = 100,
-    eccentricity: Annotated[str, typer.Option(metavar="E,E,...", help="Of the orbits.")] = "0.3,0.7",
-    steps: Annotated[int, typer.Option(help="Of the march that shows rounding, at least 1000.")] = 100_000,
+    revolutions: Annotated[
+        float, typer.Option(help="Revolutions of each orbit; the figure of docs/stability.md has 1000.")
+    ] = 100,
+    eccentricity: Annotated[
+        str, typer.Option(metavar="E,E,...", help="Eccentricities of the orbits.")
+    ] = "0.3,0.7",
+    steps: Annotated[
+        int, typer.Option(help="Steps of the march that shows rounding, at least 1000.")
+    ] = 100_000,
     turned: Annotated[
         int, typer.Option(help="Steps of bodies that turn or hang on rods, at least 10.")
     ] = 2_000,

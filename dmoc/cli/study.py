@@ -16,13 +16,17 @@ from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, transfe
 
 def study(
     name: Name,
-    orders: Annotated[str, typer.Option(metavar="N,N,...", help="Of 2, 4, 6, 8.")] = "2,4,6,8",
+    orders: Annotated[
+        str, typer.Option(metavar="N,N,...", help="Orders to compare, of 2, 4, 6, 8.")
+    ] = "2,4,6,8",
     steps: Annotated[
         str | None, typer.Option(metavar="N,N,...", help="Numbers of steps; if not given, some for each order.")
     ] = None,
     against: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Other methods, such as scripts/alternatives.py. The file is run."),
+        typer.Option(
+            metavar="FILE", help="A Python file with other methods, such as scripts/alternatives.py. It is run."
+        ),
     ] = None,
     cold: Annotated[bool, switch("--cold", help="Also without coarse meshes on the way.")] = False,
     compiled: Annotated[

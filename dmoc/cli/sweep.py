@@ -47,10 +47,11 @@ def sweep(
     ],
     out: Annotated[Path, typer.Option(help="Where to write the results (netCDF).")],
     sample: Annotated[
-        int | None, typer.Option(metavar="N", help="So many points spread over the ranges, not a grid.")
+        int | None,
+        typer.Option(metavar="N", help="Solve so many points spread over the ranges instead of a grid."),
     ] = None,
     method: Annotated[str, typer.Option(help="How a sample is spread: sobol or latin.")] = "sobol",
-    seed: Annotated[int, typer.Option(help="Which sample.")] = 0,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same sample.")] = 0,
     order: Order = None,
     steps: Steps = None,
     tol: Annotated[float | None, typer.Option(help="Relative error to reach instead, at every point.")] = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,9 @@ SPEED_FLOOR = 1e-6
 
 @dataclass(frozen=True)
 class Wind(Part):
-    """The velocity of the air over the ground.
+    """The velocity of the air over the ground, for the argument `wind` of an atmosphere.
+
+    `Drag(area, drag_coefficient, UniformAtmosphere(1.2, wind=Wind((-3, 0))))` is a drag with a wind.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ class Wind(Part):
         return as_column(self.field(t, q) if callable(self.field) else self.field)
 
 
-class Atmosphere(Part, ABC):
+class Atmosphere(Part):
     """Density and velocity of the air; derive from this, as a frozen dataclass, for one of your own.
 
     Whoever implements an atmosphere
@@ -72,6 +74,10 @@ class Atmosphere(Part, ABC):
     def velocity_at(self, t: Any, q: Any) -> Any:
         """Velocity of the air there [m/s], a column; 0 if it is at rest."""
         return 0
+
+    def body_radius(self) -> float:
+        """Radius of the body at the origin that the air is around [m], 0 where there is none."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -159,6 +165,9 @@ class ExponentialAtmosphere(Atmosphere):
                 f"got {self.height:g} and {self.radius:g} m"
             )
 
+    def body_radius(self) -> float:
+        return self.radius
+
     def check_dimension(self, dimension: int) -> None:
         if dimension == 1:
             raise ValueError("ExponentialAtmosphere needs 2 or 3 dimensions; got 1")
@@ -215,6 +224,9 @@ class Drag(Force):
                 f"atmosphere must be a dmoc.Atmosphere; got {short(self.atmosphere)}: for one density [kg/m^3] "
                 "everywhere give UniformAtmosphere(density)"
             )
+
+    def body_radius(self) -> float:
+        return self.atmosphere.body_radius()
 
     def check_dimension(self, dimension: int) -> None:
         self.atmosphere.check_dimension(dimension)

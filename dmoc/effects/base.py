@@ -6,7 +6,7 @@ dimension) and `m` the mass [kg]. Constants of an effect are baked into the grap
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar, NamedTuple
@@ -14,9 +14,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from dmoc.basics.docstrings import documented, first_line
+from dmoc.basics.duties import Duties
 
 
-class Part:
+class Part(Duties):
     """Something that can say in one line what it is."""
 
     def words(self) -> str:
@@ -77,7 +78,7 @@ class Body(NamedTuple):
     wheels: Any = None
 
 
-class Effect(Part, ABC):
+class Effect(Part):
     """Something that acts on the body. Derive from one of the four classes below, never from this.
 
     `Conservative` and `Force` act on its position and see its position and velocity; `BodyConservative` and
@@ -147,6 +148,28 @@ class Conservative(Effect):
 
     Not its business: whether energy is kept. That is read from the expression: where it contains `t`, or the
     mass while propellant burns, the check of the energy is left out.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import casadi as ca
+    >>> from dmoc import Conservative, State, TransferProblem, solve
+    >>> @dataclass(frozen=True)
+    ... class Bowl(Conservative):
+    ...     '''A bowl in which a ball rolls without friction.
+    ...
+    ...     Parameters
+    ...     ----------
+    ...     steepness : float
+    ...         V = 1/2 steepness m |q|^2 [1/s^2].
+    ...     '''
+    ...     steepness: float
+    ...     def lagrangian(self, t, q, v, m):
+    ...         return -0.5 * self.steepness * ca.dot(q, q)
+    >>> across = State((1.0,), (0.0,)), State((-1.0,), (0.0,))
+    >>> problem = TransferProblem(1.0, *across, duration=3.0, effects=[Bowl(1.0)])
+    >>> print(f"{solve(problem).objective:.3f} N^2 s with {Bowl(1.0).words()}")
+    0.007 N^2 s with A bowl in which a ball rolls without friction (Bowl, steepness 1 1/s^2)
     """
 
     @abstractmethod
@@ -164,6 +187,28 @@ class Force(Effect):
     stated as a force, it would let the energy drift over long runs.
 
     Not its business: the work that is done, which is summed up along the path, and the power of the actuator.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import casadi as ca
+    >>> from dmoc import Force, State, TransferProblem, solve
+    >>> @dataclass(frozen=True)
+    ... class QuadraticDrag(Force):
+    ...     '''Air that resists with the square of the speed.
+    ...
+    ...     Parameters
+    ...     ----------
+    ...     coefficient : float
+    ...         Force over squared speed [kg/m].
+    ...     '''
+    ...     coefficient: float
+    ...     def force(self, t, q, v, m):
+    ...         return -self.coefficient * ca.sqrt(ca.dot(v, v) + 1e-12) * v
+    >>> along = State((0.0,), (1.0,)), State((1.0,), (1.0,))
+    >>> problem = TransferProblem(1.0, *along, duration=1.0, effects=[QuadraticDrag(0.5)])
+    >>> print(f"{solve(problem).objective:.3f} N^2 s, the air takes 0.5 N all along")
+    0.125 N^2 s, the air takes 0.5 N all along
     """
 
     @abstractmethod

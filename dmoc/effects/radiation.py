@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ ASTRONOMICAL_UNIT = 149_597_870_700.0
 NEAREST_SUN = 1e9
 
 
-class Shadow(Part, ABC):
+class Shadow(Part):
     """The shadow of a sphere at the origin; derive from this, as a frozen dataclass, for one of your own.
 
     Whoever implements a shadow gives `light`

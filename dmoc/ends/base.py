@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, checked, entries, same_length, vector
+from dmoc.basics.duties import Duties
 from dmoc.parts.rows import Row
 
 
-class Boundary(ABC):
+class Boundary(Duties):
     """A condition on time, position, velocity and mass at one end of the transfer.
 
     A frozen dataclass that derives from this has these duties:
@@ -35,6 +36,8 @@ class Boundary(ABC):
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> from dmoc import Boundary, Row, State, TransferProblem, solve
     >>> @dataclass(frozen=True)
     ... class OnGround(Boundary):
     ...     height: float
@@ -46,6 +49,9 @@ class Boundary(ABC):
     ...         return [Row("height", q[1] - self.height, 0.0, 0.0, "m")]
     ...     def words(self):
     ...         return f"any point at a height of {self.height:g} m"
+    >>> problem = TransferProblem(1.0, State((0, 1), (1, 0)), OnGround(0.0), duration=2.0)
+    >>> print(abs(solve(problem).position[-1, 1]) < 1e-9)
+    True
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()

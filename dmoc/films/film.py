@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmoc.basics.arguments import of_kind, short
 from dmoc.basics.files import as_path, whole_file
 from dmoc.films.frames import Scene, scene_of
-from dmoc.missions.solution import MissionSolution
 from dmoc.plots.mission import scenery
-from dmoc.plots.style import AXIS_COLOURS, CHANNEL_COLOURS, DARK, PALE, PUSH, SETTINGS, readable
+from dmoc.plots.style import AXIS_COLOURS, DARK, PALE, PUSH, SETTINGS, readable
 from dmoc.plots.surroundings import draw_scene, view_of
 from dmoc.results.solution import Solution
+
+if TYPE_CHECKING:
+    from dmoc.missions.solution import MissionSolution
+    from dmoc.teams.solution import TeamSolution
 
 # A film can be written in these formats, which the end of the file's name decides.
 SUFFIXES = (".gif", ".mp4")
@@ -28,14 +31,17 @@ ROW = 72
 NEAR = 1e-9
 
 
-def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frames: int = 80) -> None:
+def animate(
+    solution: Solution | MissionSolution | TeamSolution, path: str | os.PathLike, frames: int = 80
+) -> None:
     """Write a moving picture of a solution, whole or not at all.
 
     Of a mission each leg has its colour; joints are marked, and the arrow of an impulse stays from its time on.
+    Of a team each body has its colour and its name.
 
     Parameters
     ----------
-    solution : Solution or MissionSolution
+    solution : Solution, MissionSolution or TeamSolution
     path : path
         Ends in .gif or, where ffmpeg is on the computer, in .mp4.
     frames : int
@@ -46,15 +52,14 @@ def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frame
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
-    if hasattr(solution, "members"):
-        raise ValueError("a team of bodies has no moving picture yet; animate(solution.members[0], path) has")
-    mission = hasattr(solution, "legs")
-    of_kind("solution", solution, MissionSolution if mission else Solution)
+    several = hasattr(solution, "legs") or hasattr(solution, "members")
+    if not several:
+        of_kind("solution", solution, Solution)
     check_target(path)
     if type(frames) is not int or not 2 <= frames <= MOST_FRAMES:
         raise ValueError(f"frames must be a whole number from 2 to {MOST_FRAMES}; got {short(frames)}")
-    legs: Any = getattr(solution, "legs", [solution])
-    if not all(np.isfinite(leg.path.position).all() for leg in legs):
+    parts: Any = getattr(solution, "legs", None) or getattr(solution, "members", None) or [solution]
+    if not all(np.isfinite(part.path.position).all() for part in parts):
         raise ValueError("the path is not finite, so there is nothing to show")
     import matplotlib
     from matplotlib import animation
@@ -63,7 +68,7 @@ def animate(solution: Solution | MissionSolution, path: str | os.PathLike, frame
     scene = scene_of(solution, frames)
     with matplotlib.rc_context(SETTINGS), whole_file(path) as temporary:
         page = Figure(figsize=SIZE)
-        film = _Film(page, scenery(solution) if mission else solution, scene)  # type: ignore[arg-type]
+        film = _Film(page, scenery(solution) if several else solution, scene)  # type: ignore[arg-type]
         if as_path(path).suffix.lower() == ".gif":
             _write_gif(film, page, temporary, frames)
             return
@@ -139,8 +144,7 @@ class _Film:
         self.pushes = [self._line(push[0], color=PUSH, linewidth=2.6) for push in scene.pushes]
         dot: dict[str, Any] = {"marker": "o", "markersize": 8, "linestyle": "none"}
         self.bodies = [
-            self._line(path[:1], color=CHANNEL_COLOURS[i % len(CHANNEL_COLOURS)], **dot)
-            for i, path in enumerate(scene.places)
+            self._line(path[:1], color=scene.colour(i), **dot) for i, path in enumerate(scene.places)
         ]
         named = list(zip(self.bodies, scene.names, strict=True))
         named += {

@@ -15,6 +15,7 @@ from dmoc.links.along import states_of
 from dmoc.plots.lanes import looks_of
 from dmoc.plots.mission import MUCH_LOST, NOTHING, SHORTEST
 from dmoc.plots.style import CHANNEL_COLOURS, flown_control, within_steps
+from dmoc.plots.team import styles
 from dmoc.results.solution import Solution
 
 # The axes of a body are this long, as a part of what is to be seen [-]; at the goal that is seen beside them.
@@ -64,6 +65,11 @@ class Scene:
     joints: np.ndarray
     kicks: list[tuple[float, np.ndarray]]
 
+    def colour(self, body: int) -> str:
+        """The colour of a body that moves on one trail; where it changes from leg to leg, that of any body."""
+        own = {trail.colour for trail in self.trails if trail.body == body}
+        return own.pop() if len(own) == 1 else CHANNEL_COLOURS[body % len(CHANNEL_COLOURS)]
+
     @property
     def everything(self) -> np.ndarray:
         """All points that are shown at some time, shape (count, axes)."""
@@ -73,9 +79,36 @@ class Scene:
 
 
 def scene_of(solution: Any, frames: int) -> Scene:
-    """The lines of a film of so many frames at even times, of a Solution or a MissionSolution."""
+    """The lines of a film of so many frames at even times, of a Solution, MissionSolution or TeamSolution."""
     times = np.linspace(solution.time[0], solution.time[-1], frames)
+    if hasattr(solution, "members"):
+        return _team(solution, times)
     return _mission(solution, times) if hasattr(solution, "legs") else _scene(solution, times)
+
+
+def _team(solution: Any, times: np.ndarray) -> Scene:
+    """The lines of all bodies, each with its name and in its colour."""
+    extent = float(np.ptp(solution.position, axis=0).max()) or 1.0
+    largest = max(float(np.linalg.norm(one.force, axis=1).max(initial=0.0)) for one in solution.members)
+    parts = [_scene(one, times, _Scale(extent, largest)) for one in solution.members]
+    trails = [
+        Trail(i, known.times, known.points, style["color"])
+        for i, (part, style) in enumerate(zip(parts, styles(solution.names), strict=True))
+        for known in part.trails
+    ]
+    return Scene(
+        times,
+        parts[0].axes,
+        list(solution.names),
+        [place for part in parts for place in part.places],
+        [link for part in parts for link in part.links],
+        [arm for part in parts for arm in part.triads],
+        [push for part in parts for push in part.pushes],
+        next((part.push_words for part in parts if part.pushes), ""),
+        trails,
+        np.empty((0, parts[0].axes)),
+        [],
+    )
 
 
 def _mission(solution: Any, times: np.ndarray) -> Scene:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.basics.duties import Duties
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
 
@@ -34,7 +35,7 @@ class Passed(NamedTuple):
     kick: tuple[Any, Any] | None = None
 
 
-class Event(ABC):
+class Event(Duties):
     """What happens between two legs, at one instant.
 
     A frozen dataclass that derives from this says what becomes of a state, `passed`, and what it is in `words`.

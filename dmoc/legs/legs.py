@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, short, whole
+from dmoc.basics.duties import Named
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Event
 from dmoc.parts.forces import Unpowered
 
 
 @dataclass(frozen=True)
-class Leg:
+class Leg(Named):
     """A part of a mission, with its own forces, limits and duration. What is not given is the mission's.
 
     Parameters

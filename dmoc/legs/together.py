@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -13,12 +13,13 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, flag, number, short
 from dmoc.basics.digits import down
+from dmoc.basics.duties import Duties
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import KeepOut
 from dmoc.parts.rows import Row
 
 
-class Together(ABC):
+class Together(Duties):
     """Something that holds between bodies of a team, pair by pair.
 
     A frozen dataclass that derives from this has these duties:
@@ -31,6 +32,7 @@ class Together(ABC):
     `between` names the bodies that it is about; all of the team if it is empty.
     """
 
+    one_of = ("rows", "goal_rows")
     between: Sequence[str]
 
     def pairs(self, names: Sequence[str]) -> list[tuple[int, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.effects.base import Body, Part
 
 
-class Holonomic(Part, ABC):
+class Holonomic(Part):
     """A link that holds a body: it stays where g(q) = 0.
 
     A frozen dataclass that derives from this has one duty, `g`. The force of the link is found with the path,
@@ -19,11 +19,18 @@ class Holonomic(Part, ABC):
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> from dmoc import Holonomic, State, TransferProblem, solve
     >>> @dataclass(frozen=True)
     ... class Wire(Holonomic):
     ...     steepness: float
     ...     def g(self, q):
     ...         return q[1] - self.steepness * q[0] ** 2
+    >>> along = State((-1, 1), (0, 0)), State((1, 1), (0, 0))
+    >>> problem = TransferProblem(1.0, *along, duration=2.0, links=[Wire(1.0)])
+    >>> solution = solve(problem)
+    >>> print(abs(solution.position[:, 1] - solution.position[:, 0] ** 2).max() < 1e-9)
+    True
     """
 
     # The unit of g: the force of the link is then per unit of it.

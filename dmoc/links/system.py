@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
+from dmoc.basics.duties import Named
 from dmoc.configurations.rigid import checked_inertia
 from dmoc.links.holonomic import Holonomic
 
@@ -15,7 +16,7 @@ LONGEST_NAME = 40
 
 
 @dataclass(frozen=True)
-class Member:
+class Member(Named):
     """A body of a system: a point mass, or with an inertia a rigid body.
 
     Parameters
@@ -44,7 +45,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class System:
+class System(Named):
     """Bodies that move together, held by links: the first argument of a `TransferProblem` in place of a mass.
 
     Parameters

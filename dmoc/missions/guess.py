@@ -272,3 +272,17 @@ def mesh_around(
         mesh = np.interp(mesh, angles / angles[-1], fractions)
         mesh[0], mesh[-1] = 0.0, 1.0
     return mesh
+
+
+def first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
+    """The path to start from, on its first meshes."""
+    given = mission.guess if guess is None else guess
+    given = getattr(given, "path", given)
+    if isinstance(given, MissionPath) and not given.suits(mission):
+        given = given.as_arrays()
+    if isinstance(given, MissionPath):
+        return given.onto(meshes_along(mission, given, order, steps)) if order or steps else given
+    orders = [leg.order or order or ORDER for leg in mission.plan]
+    counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
+    path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
+    return path.onto(meshes_along(mission, path, order, steps))

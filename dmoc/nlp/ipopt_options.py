@@ -141,7 +141,7 @@ def _falls_past(problem: TransferProblem, mesh: np.ndarray) -> bool:
 
 
 def _comes_to_zero(engine: Any) -> bool:
-    """Whether a thrust may be none: where it is full throughout, a barrier that may rise takes twice as long."""
+    """Whether a thrust may be none: where it never is, a barrier that may rise takes twice as long."""
     return getattr(engine, "min_thrust", 0.0) != engine.force_limit()
 
 

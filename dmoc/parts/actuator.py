@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -11,12 +10,13 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
+from dmoc.basics.duties import Duties
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
 
 
-class Actuator(ABC):
+class Actuator(Duties):
     """Controls u of one node and the force they make. A force actuator's controls are its force [N].
 
     A frozen dataclass that derives from this has these duties, each with a default that suits a free force:
@@ -34,6 +34,10 @@ class Actuator(ABC):
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> import casadi as ca
+    >>> import numpy as np
+    >>> from dmoc import Actuator, State, Time, TransferProblem, UniformGravity, solve
     >>> @dataclass(frozen=True)
     ... class Lift(Actuator):
     ...     limit: float
@@ -49,6 +53,11 @@ class Actuator(ABC):
     ...         return self.limit
     ...     def words(self):
     ...         return f"a force upwards of at most {self.limit:g} N"
+    >>> floors = State((0, 0), (0, 0)), State((0, 4), (0, 0))
+    >>> gravity = [UniformGravity((0, -1.0))]
+    >>> problem = TransferProblem(1.0, *floors, (1.0, 9.0), gravity, Lift(2.0), Time())
+    >>> print(f"{solve(problem).duration:.3f} s")
+    4.000 s
     """
 
     adjustable: ClassVar[tuple[str, ...]] = ()
@@ -239,7 +248,7 @@ class Actuator(ABC):
         return ()
 
     def kept(self, sides: Sequence[int]) -> Actuator:
-        """The actuator that keeps exactly to some of its `limit_names`: -1 the lower one, 1 the upper, 0 none."""
+        """The actuator that keeps exactly to some `limit_names`: -1 the lower one, 1 the upper, 0 none."""
         raise ValueError(f"{type(self).__name__} has no limits to keep to")
 
     def beyond(self, u: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -11,13 +11,14 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, of_kind, vector
+from dmoc.basics.duties import Duties
 from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape
 from dmoc.parts.rows import Row, title
 
 
-class Constraint(ABC):
+class Constraint(Duties):
     """A limit on positions or on the speed all along the path.
 
     A frozen dataclass that derives from this has these duties:
@@ -48,6 +49,9 @@ class Constraint(ABC):
 
     Examples
     --------
+    >>> from dataclasses import dataclass
+    >>> import numpy as np
+    >>> from dmoc import Constraint, Row, State, TransferProblem, solve
     >>> @dataclass(frozen=True)
     ... class Ceiling(Constraint):
     ...     height: float
@@ -57,8 +61,13 @@ class Constraint(ABC):
     ...         return np.maximum(0.0, q[:, -1] - self.height)
     ...     def words(self):
     ...         return f"stays below {self.height:g} m"
+    >>> thrown = State((0, 0), (1, 1)), State((2, 0), (1, -1))
+    >>> problem = TransferProblem(1.0, *thrown, duration=2.0, constraints=[Ceiling(0.2)])
+    >>> print(f"{solve(problem).position[:, 1].max():.3f} m")
+    0.200 m
     """
 
+    one_of = ("rows", "speed_rows", "bounds", "rows_of", "speed_rows_of", "rows_at", "speed_rows_at")
     unit: ClassVar[str] = "m"
     adjustable: ClassVar[tuple[str, ...]] = ()
     # Whether it looks at the attitude, so that it limits rigid bodies alone.

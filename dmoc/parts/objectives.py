@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -11,10 +10,11 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
+from dmoc.basics.duties import Duties
 from dmoc.parts.actuator import Actuator
 
 
-class Objective(ABC):
+class Objective(Duties):
     """The integral of `running` over time plus `terminal` at the goal.
 
     A frozen dataclass that derives from this has these duties:
@@ -22,11 +22,8 @@ class Objective(ABC):
     1. State its value as CasADi expressions, with its own sign: `running`, per second at an instant of the
        path, `terminal`, of the state at the goal, or both.
     2. Name the `unit` of that value, and set `sense` to -1 if it is maximised.
-
-    What follows has a default that suits most objectives:
-
-    3. `rate` in place of `running`, and `unit_with` in place of `unit`, where the value depends on the force
-       or the mass flow that an actuator makes of its controls.
+    3. All else has a default. Write `rate` in place of `running`, and `unit_with` in place of `unit`, where the
+       value depends on the force or the mass flow that an actuator makes of its controls.
     4. `metered`, where it needs the magnitude of the force among the controls.
     5. `check_dimension`: refuse a problem in whose number of axes it has no meaning.
     6. `words`, by default the first line of its docstring, and `label`, by default the name of its class.
@@ -48,15 +45,20 @@ class Objective(ABC):
 
     Examples
     --------
-    >>> @dataclass(frozen=True)
-    ... class Closeness(Objective):
+    >>> import casadi as ca
+    >>> from dmoc import BoxForce, Objective, State, TransferProblem, solve
+    >>> class Closeness(Objective):
+    ...     '''Least integral of the squared distance from the origin.'''
     ...     unit = "m^2 s"
     ...     def running(self, t, q, v, u, m):
     ...         return ca.dot(q, q)
-    ...     def words(self):
-    ...         return "Least integral of the squared distance from the origin"
+    >>> ends = State((0, 1), (0, 0)), State((1, 0), (0, 0))
+    >>> problem = TransferProblem(1.0, *ends, 3.0, actuator=BoxForce(2.0), objective=Closeness())
+    >>> print(solve(problem, steps=50).position[25].max() < 0.5)
+    True
     """
 
+    one_of = ("running", "terminal", "rate", "kick")
     unit: ClassVar[str] = ""
     sense: ClassVar[int] = 1
     metered: ClassVar[bool] = False

@@ -14,7 +14,7 @@ import numpy as np
 
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
-from dmoc.missions.climb import first_path
+from dmoc.missions.guess import first_path
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Group

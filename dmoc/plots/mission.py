@@ -53,7 +53,7 @@ def mission_page(solution: MissionSolution, report: Report | None = None) -> Fig
     if view is not None:
         _draw_path(path, solution, view, wide)
     elif solution.dimension:
-        _draw_line(path, solution)
+        draw_line(path, solution)
     else:
         for leg in solution.legs:
             draw_sphere(path, leg)
@@ -179,7 +179,7 @@ def _mark_joints(axes: Any, places: np.ndarray) -> None:
         axes.plot(*places.T, marker="D", markersize=7, label="joint", **style)
 
 
-def _draw_line(axes: Any, solution: MissionSolution) -> None:
+def draw_line(axes: Any, solution: MissionSolution) -> None:
     """Position against time in one dimension."""
     (late, late_unit), (size, unit) = readable(solution.time, "s"), readable(solution.position, "m")
     joints = []

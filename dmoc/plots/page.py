@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from dmoc.plots.linked import (
     reaction_units,
 )
 from dmoc.plots.path import draw_path, is_wide
-from dmoc.plots.sheet import arrange, entitle, new_page, new_panels, shade_burns
+from dmoc.plots.sheet import arrange, darken, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,
@@ -54,6 +55,7 @@ def save_figure(
     path: str | os.PathLike,
     report: Report | None = None,
     dpi: float = 150,
+    dark: bool = False,
 ) -> None:
     """Draw a solution into a file, whole or not at all.
 
@@ -66,6 +68,8 @@ def save_figure(
         Checks whose outcome is written below the panels.
     dpi : float
         Dots per inch of a .png; the page is 13.33 inches wide.
+    dark : bool
+        On a dark background.
 
     Raises
     ------
@@ -77,6 +81,8 @@ def save_figure(
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
     page = figure(solution, report)
+    if dark:
+        darken(page)
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)
 
@@ -108,7 +114,7 @@ def figure(solution: Any, report: Report | None = None) -> Figure:
         turns = bool(solution.path.attitudes)
         held = solution.reaction is not None
         wide = not held and is_wide(solution)
-        drawn = _linked_panels(solution) if held else _turning_panels(solution) if turns else PANELS
+        drawn = panels_of(solution)
         path, panels = new_panels(page, 3 if turns else solution.dimension, wide, len(drawn))
         left = draw_bodies if held else draw_path if solution.dimension else draw_sphere
         left(path, solution, **({"beside": True} if wide else {}))
@@ -119,6 +125,13 @@ def figure(solution: Any, report: Report | None = None) -> Figure:
         arrange(page, panels, wide, unit)
         entitle(page, solution, report, size, unit)
     return page
+
+
+def panels_of(solution: Solution) -> Sequence[Any]:
+    """What is drawn over time of a transfer: functions of a panel, the solution and the unit of time [s]."""
+    if solution.reaction is not None:
+        return _linked_panels(solution)
+    return _turning_panels(solution) if solution.path.attitudes else PANELS
 
 
 def _turning_panels(solution: Solution) -> list[Any]:
@@ -177,7 +190,7 @@ def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) ->
             axes.plot([], [], label=f"{words}\n{abs(level) / size:.3g} {unit}", **LIMIT)
 
 
-def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
+def draw_speed(axes: Any, solution: Solution, late: float) -> None:
     times, speed = speeds(solution)
     size, unit = readable(speed, "m/s")
     name = "velocity" if solution.dimension == 1 else "speed"
@@ -198,4 +211,4 @@ def _draw_speed(axes: Any, solution: Solution, late: float) -> None:
 
 
 # What is drawn over time of a point mass.
-PANELS = (_draw_force, _draw_speed, draw_ledger)
+PANELS = (_draw_force, draw_speed, draw_ledger)

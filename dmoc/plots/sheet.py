@@ -20,6 +20,43 @@ if TYPE_CHECKING:
 # Units in the headline have this sign for a square.
 SQUARED = "\u00b2"
 
+# What a picture on a light background has in these colours, one on a dark background has in those: letters and
+# lines, the page itself, and what would be too dark on it.
+ON_DARK = {
+    "#000000": "#e4e6e8",
+    "#222222": "#e4e6e8",
+    "#262626": "#e4e6e8",
+    "#ffffff": "#14171b",
+    "#b0b0b0": "#4a525b",
+    "#0072b2": "#4aa8e0",
+    "#d55e00": "#f58a42",
+    "#009e73": "#35c79c",
+    "#b03a00": "#ff9a62",
+}
+# The walls of a box in space on a dark background.
+WALL = "#1d2228"
+# What has colours of these kinds is turned dark.
+COLOURED = ("color", "facecolor", "edgecolor", "markerfacecolor", "markeredgecolor")
+
+
+def darken(page: Figure) -> None:
+    """Turn a picture to a dark background."""
+    from matplotlib.colors import to_hex, to_rgba_array
+
+    for artist in page.findobj():
+        for kind in COLOURED:
+            if not (hasattr(artist, f"get_{kind}") and hasattr(artist, f"set_{kind}")):
+                continue
+            colours = to_rgba_array(getattr(artist, f"get_{kind}")())
+            turned = [to_rgba_array(ON_DARK.get(to_hex(one), to_hex(one)))[0] for one in colours]
+            found = np.array([[*new[:3], old[3]] for new, old in zip(turned, colours, strict=True)])
+            if len(found) and (found != colours).any():
+                getattr(artist, f"set_{kind}")(found[0] if len(found) == 1 else found)
+    boxes: Any = [axes for axes in page.axes if axes.name == "3d"]
+    for box in boxes:
+        for axis in (box.xaxis, box.yaxis, box.zaxis):
+            axis.set_pane_color(WALL)
+
 
 def new_page(dimension: int) -> Figure:
     """An empty page for a path in so many dimensions."""

@@ -45,24 +45,24 @@ def view_of(solution: Solution, drawn: np.ndarray) -> Corners:
 
 def _boxes(solution: Solution) -> list[Corners]:
     """Opposite corners of attractors, spheres and cones [m]."""
-    boxes = [(center - radius, center + radius) for center, radius in _attractors(solution)]
+    boxes = [(center - radius, center + radius) for center, radius in attractors(solution)]
     for shape in outlines(solution):
         if isinstance(shape, Ball):
             boxes.append((shape.center - shape.radius, shape.center + shape.radius))
         elif isinstance(shape, Cone):
-            rim = _cone(solution, shape).reshape(solution.dimension, -1)
+            rim = cone_surface(solution, shape).reshape(solution.dimension, -1)
             boxes.append((rim.min(axis=1), rim.max(axis=1)))
     return boxes
 
 
-def _attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
+def attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
     """Centres of the point masses and their radii where the scene tells them [m], else 0."""
     effects = solution.problem.effects if solution.problem else ()
     radius = max((effect.body_radius() for effect in effects), default=0.0)
     # Where the scene tells a radius it is that of the body at the origin.
     return [
         (source.place(solution.dimension), radius if source.center is None else 0.0)
-        for source in _sources(solution)
+        for source in sources(solution)
     ]
 
 
@@ -76,15 +76,16 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
             _draw_ball(axes, shape.center / size, shape.radius / size, view, FORBIDDEN, "keep-out zone")
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label="keep-out zone"))
         elif isinstance(shape, Box):
-            _draw_room(axes, shape.lower / size, shape.upper / size, view)
+            for edge in room_edges(shape.lower / size, shape.upper / size, view):
+                axes.plot(*edge, color=FORBIDDEN, linestyle="--", label="keep-in zone")
         elif isinstance(shape, Cone):
-            _draw_cone(axes, _cone(solution, shape) / size)
-    for zone in _without_outline(solution):
-        if _draw_region(axes, zone, view, size):
+            _draw_cone(axes, cone_surface(solution, shape) / size)
+    for zone in without_outline(solution):
+        if draw_region(axes, zone, view, size):
             name = f"forbidden by {type(zone).__name__}"
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label=name))
-    largest = max((source.mu for source in _sources(solution)), default=1.0)
-    for (center, radius), source in zip(_attractors(solution), _sources(solution), strict=True):
+    largest = max((source.mu for source in sources(solution)), default=1.0)
+    for (center, radius), source in zip(attractors(solution), sources(solution), strict=True):
         colour = colour_of(source)
         if radius:
             _draw_ball(axes, center / size, radius / size, view, colour, "attractor")
@@ -108,14 +109,14 @@ def outlines(solution: Solution) -> list[Shape]:
     return [shape for constraint in constraints for shape in constraint.outline()]
 
 
-def _without_outline(solution: Solution) -> list[Constraint]:
+def without_outline(solution: Solution) -> list[Constraint]:
     """Limits on positions in the plane that tell no shape of theirs."""
     if solution.problem is None or solution.dimension != 2:
         return []
     return [one for one in solution.problem.constraints if not one.limits_speed and not one.outline()]
 
 
-def _draw_region(axes: Any, zone: Constraint, view: Corners, size: float) -> bool:
+def draw_region(axes: Any, zone: Constraint, view: Corners, size: float) -> bool:
     """Fill where a limit is broken by a body at rest; whether there is such a place in view."""
     span = (view[1] - view[0]).max()
     # Axes of equal scale show more than the view along one of them.
@@ -130,7 +131,7 @@ def _draw_region(axes: Any, zone: Constraint, view: Corners, size: float) -> boo
     return True
 
 
-def _sources(solution: Solution) -> tuple[Attractor, ...]:
+def sources(solution: Solution) -> tuple[Attractor, ...]:
     return solution.problem.attraction.sources if solution.problem else ()
 
 
@@ -156,7 +157,7 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
     axes.plot_surface(*surface, **style).set_gid(name)
 
 
-def _cone(solution: Solution, cone: Cone) -> np.ndarray:
+def cone_surface(solution: Solution, cone: Cone) -> np.ndarray:
     """Points of a cone from the tip to as deep as the path goes [m], shape (axes, depths, around)."""
     axis, apex = cone.axis, cone.apex
     places = solution.position.reshape(-1, solution.dimension)
@@ -178,15 +179,15 @@ def _draw_cone(axes: Any, surface: np.ndarray) -> None:
         axes.plot(*surface[:, :, side], **style)
 
 
-def _draw_room(axes: Any, lower: np.ndarray, upper: np.ndarray, view: Corners) -> None:
-    """The edges of a box, as far as they are in view."""
-    n = len(lower)
+def room_edges(lower: np.ndarray, upper: np.ndarray, view: Corners) -> list[np.ndarray]:
+    """The edges of a box, as far as they are in view, shape (axes, 2) each."""
+    n, found = len(lower), []
     for along in range(n):
         others = [axis for axis in range(n) if axis != along]
         span = max(lower[along], view[0][along]), min(upper[along], view[1][along])
         for corner in product(*[(lower[axis], upper[axis]) for axis in others]):
-            if not all(view[0][axis] < c < view[1][axis] for axis, c in zip(others, corner, strict=True)):
-                continue
-            edge = np.empty((n, 2))
-            edge[along], edge[others] = span, np.array(corner)[:, None]
-            axes.plot(*edge, color=FORBIDDEN, linestyle="--", label="keep-in zone")
+            if all(view[0][axis] < c < view[1][axis] for axis, c in zip(others, corner, strict=True)):
+                edge = np.empty((n, 2))
+                edge[along], edge[others] = span, np.array(corner)[:, None]
+                found.append(edge)
+    return found

@@ -33,17 +33,16 @@ FAR = 4.0
 def team_page(solution: TeamSolution, report: Report | None = None) -> Figure:
     """A matplotlib Figure of a team, whose settings are those of the caller."""
     page = new_page(solution.dimension)
-    lanes = (_draw_forces, _draw_speeds, _draw_distances)
     around: Any = scenery(solution)  # type: ignore[arg-type]
     view = view_of(around, solution.position) if solution.dimension > 1 else None
     wide = view is not None and lies_wide(view)
-    path, panels = new_panels(page, solution.dimension, wide, len(lanes))
+    path, panels = new_panels(page, solution.dimension, wide, len(LANES))
     if view is not None:
         _draw_paths(path, solution, (around, view), wide)
     else:
-        _draw_lines(path, solution)
+        draw_lines(path, solution)
     size, unit = readable(solution.time, "s")
-    for panel, draw in zip(panels, lanes, strict=True):
+    for panel, draw in zip(panels, LANES, strict=True):
         draw(panel, solution, size)
         for one in solution.members:
             shade_burns(panel, one, size)
@@ -113,7 +112,7 @@ def _arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, colour: str) -> No
     axes.quiver(*tails.T, *arrows.T, color=colour, alpha=0.6, zorder=4, **style).set_gid("force")
 
 
-def _draw_lines(axes: Any, solution: TeamSolution) -> None:
+def draw_lines(axes: Any, solution: TeamSolution) -> None:
     """Positions against time in one dimension."""
     (late, late_unit), (size, unit) = readable(solution.time, "s"), readable(solution.position, "m")
     for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
@@ -180,3 +179,7 @@ def _draw_distances(axes: Any, solution: TeamSolution, late: float) -> None:
     axes.set_ylim(0.0, (most or 1.0) / size)
     axes.set_ylabel(f"distance [{unit}]")
     axes.set_title("Distance of each two bodies")
+
+
+# What is drawn over time of a team.
+LANES = (_draw_forces, _draw_speeds, _draw_distances)

@@ -39,7 +39,8 @@ ROUND = 181
 
 def draw_sphere(axes: Any, solution: Solution) -> None:
     """Where the body axes point on the way, on the unit sphere in space, with the cones of the constraints."""
-    _draw_globe(axes)
+    for line in globe_lines():
+        axes.plot(*line.T, color=PALE, linewidth=0.7, alpha=0.45, zorder=1)
     attitude = normalised(within_steps(solution, solution.path.attitudes[0])[1])
     for i, name in enumerate("xyz"):
         along = rotated(attitude, np.broadcast_to(np.eye(3)[i], (len(attitude), 3)))
@@ -64,14 +65,18 @@ def draw_sphere(axes: Any, solution: Solution) -> None:
     axes.legend(ncol=3, loc="upper center", bbox_to_anchor=(0.5, -0.03))
 
 
-def _draw_globe(axes: Any) -> None:
-    turn = np.radians(np.linspace(0, 360, ROUND))
-    for height in np.radians(np.arange(-90 + GRATICULE, 90, GRATICULE)):
-        ring = np.cos(height) * np.cos(turn), np.cos(height) * np.sin(turn), np.full(ROUND, np.sin(height))
-        axes.plot(*ring, color=PALE, linewidth=0.7, alpha=0.45, zorder=1)
-    for east in np.radians(np.arange(0, 180, GRATICULE)):
-        ring = np.cos(turn) * np.cos(east), np.cos(turn) * np.sin(east), np.sin(turn)
-        axes.plot(*ring, color=PALE, linewidth=0.7, alpha=0.45, zorder=1)
+def globe_lines() -> list[np.ndarray]:
+    """Parallels and meridians of the unit sphere, shape (points, 3) each."""
+    turn, level = np.radians(np.linspace(0, 360, ROUND)), np.zeros(ROUND)
+    rings = [
+        (np.cos(height) * np.cos(turn), np.cos(height) * np.sin(turn), level + np.sin(height))
+        for height in np.radians(np.arange(-90 + GRATICULE, 90, GRATICULE))
+    ]
+    rings += [
+        (np.cos(turn) * np.cos(east), np.cos(turn) * np.sin(east), np.sin(turn))
+        for east in np.radians(np.arange(0, 180, GRATICULE))
+    ]
+    return [np.stack(ring, axis=1) for ring in rings]
 
 
 def _draw_cone(axes: Any, solution: Solution, constraint: Any, attitude: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from dmoc.basics.arguments import both_ends, checked, entries, number, short
+from dmoc.basics.duties import Named
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose
@@ -26,7 +27,7 @@ LEAST_SHARE = 1e-4
 
 
 @dataclass(frozen=True)
-class Mission:
+class Mission(Named):
     """Move a body from `start` to `goal` in several legs at the least `objective`.
 
     Parameters

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.basics.duties import Named
 from dmoc.configurations.of_problem import free_configuration
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
@@ -25,13 +26,12 @@ from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
 from dmoc.scene.systems import check_limited, check_links, check_pushed, of_system
 
-# A duration sits on one of its limits if it is nearer to it than this part of the longest [-]: the barrier of
-# the solver keeps it that far away.
+# A duration sits on a limit that is nearer than this part of the longest [-]: the solver keeps it so far away.
 SITS_ON = 1e-6
 
 
 @dataclass(frozen=True)
-class TransferProblem:
+class TransferProblem(Named):
     """Move a body from `start` to `goal` under `effects`, pushed by `actuator`, at the least `objective`.
 
     Parameters

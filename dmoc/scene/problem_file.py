@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 FUNCTION = "problem"
 # The module of a problem file is named by this and the file's own name, which tracebacks are searched for.
 MODULE = "dmoc_problem_"
-# A line of a user's file and the message of its error are each cut off after this many letters.
-MOST_QUOTED = 160
+# After so many letters a line of a user's file and the message of its error are cut off.
+MOST_QUOTED, MOST_TOLD = 160, 400
 
 
 @dataclass(frozen=True)
@@ -291,10 +291,10 @@ def _short(value: Any) -> str:
 
 
 def _one_line(error: BaseException) -> str:
-    return _cut(error.msg if isinstance(error, SyntaxError) else str(error)) or type(error).__name__
+    return _cut(getattr(error, "msg", "") or str(error), MOST_TOLD) or type(error).__name__
 
 
-def _cut(text: str) -> str:
+def _cut(text: str, most: int = MOST_QUOTED) -> str:
     """A text on one line that is not too long."""
     text = unbroken(text)
-    return text if len(text) <= MOST_QUOTED else f"{text[: MOST_QUOTED - 3]}..."
+    return text if len(text) <= most else f"{text[: most - 3]}..."

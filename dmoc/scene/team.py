@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, short
+from dmoc.basics.duties import Named
 from dmoc.legs.together import Together
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import snake
@@ -19,7 +20,7 @@ UNNAMED = TransferProblem.__dataclass_fields__["name"].default
 
 
 @dataclass(frozen=True)
-class Team:
+class Team(Named):
     """Several bodies, each with its own transfer, that start and end at the same time.
 
     Each body keeps its own mass, effects, actuator and constraints; what holds between them is said by

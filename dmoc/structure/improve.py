@@ -150,7 +150,7 @@ def _wrong(arcs: tuple[Arc, ...], index: int, leg: Solution) -> np.ndarray:
 def _parted(
     arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray, kind: str = ""
 ) -> list[Arc]:
-    """An arc with one of another kind in it, where it is furthest wrong: a burn with a coast, or the reverse."""
+    """An arc with one of another kind in it where it is furthest wrong: a burn with a coast, or the reverse."""
     arc, leg, peak = arcs[index], found.legs[index], int(np.argmax(wrong))
     at = leg.path.fractions
     right = np.flatnonzero(wrong == 0.0)

@@ -142,8 +142,8 @@ def controls_at_limits(
 class Continued(Event):
     """Controls go on over a joint where they come to a limit, or leave it, without a jump.
 
-    The time of such a joint changes the cost by the third power of its distance from the best one alone: without
-    this condition it is hardly determined.
+    The time of such a joint changes the cost by the third power of its distance from the best one alone:
+    without this condition it is hardly determined.
 
     Parameters
     ----------

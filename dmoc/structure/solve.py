@@ -69,8 +69,8 @@ def solve_by_structure(
 ) -> Solution | MissionSolution | None:
     """The answer as a mission of arcs; None where that does not succeed.
 
-    `order` and `steps` are those of the coarse answer, `otherwise` gives the one of the ordinary ladder, which is
-    asked for where the coarse one costs far less; `more` are further arguments of `dmoc.solve`. The
+    `order` and `steps` are those of the coarse answer, `otherwise` gives the one of the ordinary ladder, which
+    is asked for where the coarse one costs far less; `more` are further arguments of `dmoc.solve`. The
     independent checks judge the result. What was found when the user or the time ended it is told as it is.
     """
     check_numerics(order, steps, tol, False, more.get("options"), more.get("progress"), more.get("time_limit"))

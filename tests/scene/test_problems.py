@@ -48,9 +48,9 @@ def test_published_and_closed_form_optima_are_met(known):
         pytest.importorskip("skyfield_data")
     solution = known.solve()
     assert abs(known.difference(solution)) < known.tolerance
-    table = REFERENCES["PLACE"].search(REFERENCES["README"].read_text())[0]
+    table = REFERENCES["PLACE"].search(REFERENCES["PAGE"].read_text())[0]
     shown = [stated(line) for line in table.splitlines() if line.startswith("|")]
-    assert stated(known.row(solution)) in shown, "write the table of the README anew"
+    assert stated(known.row(solution)) in shown, "run scripts/references.py --write"
 
 
 def stated(line):

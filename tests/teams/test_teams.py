@@ -462,7 +462,6 @@ REFUSED = {
     "cannot be simulated as a whole": lambda: dmoc.simulate(Team([ONE, TWO])),
     "a team of bodies is not exported": lambda: dmoc.export(Team([ONE, TWO]), "nowhere"),
     "a check of a name that is taken": lambda: verify(solve(Team([ONE, TWO]), steps=2), more=[twin]),
-    "no moving picture": lambda: dmoc.animate(solve(Team([ONE, TWO]), steps=2), "film.gif"),
     "no body is called 'x'; there": lambda: solve(Team([ONE, TWO]), steps=2).of("x"),
 }
 

@@ -1,0 +1,1 @@
+"""WHAT OPENS IN A BROWSER."""

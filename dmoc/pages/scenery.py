@@ -1,0 +1,114 @@
+"""What lies around a path on a page: attractors and zones, as traces of plotly.js."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from dmoc.pages.traces import apart, rounded, trace
+from dmoc.parts.outline import Ball, Box, Cone
+from dmoc.plots.style import FORBIDDEN
+from dmoc.plots.surroundings import (
+    Corners,
+    attractors,
+    colour_of,
+    cone_surface,
+    draw_region,
+    outlines,
+    room_edges,
+    sources,
+    without_outline,
+)
+
+# A circle has so many points, a sphere so many around and so many from pole to pole.
+ROUND, AROUND, DOWN = 121, 37, 19
+# Zones can be seen through: so much of them covers what is behind [-].
+CLEAR = 0.3
+
+
+def scenery_traces(around: Any, view: Corners, size: float) -> list[dict[str, Any]]:
+    """Traces of all zones and attractors in a view [m], in a unit of `size` [m]."""
+    found, zone = [], FORBIDDEN.lower()
+    for shape in outlines(around):
+        if isinstance(shape, Ball):
+            found.append(_ball(shape.center / size, shape.radius / size, zone, "keep-out zone", CLEAR))
+        elif isinstance(shape, Box):
+            corners = view[0] / size, view[1] / size
+            edges = room_edges(shape.lower / size, shape.upper / size, corners)
+            found += [_dashed(edge.T, "keep-in zone") for edge in edges]
+        elif isinstance(shape, Cone):
+            found += _cone(cone_surface(around, shape) / size)
+    found += [_area(edges / size, zone, name, CLEAR) for name, edges in _regions(around, view)]
+    for (center, radius), source in zip(attractors(around), sources(around), strict=True):
+        if (center > view[0]).all() and (center < view[1]).all():
+            colour = colour_of(source).lower()
+            if radius:
+                found.append(_ball(center / size, radius / size, colour, "attractor", 0.95))
+            else:
+                found.append(_dot(center / size, colour))
+    return found
+
+
+def _regions(around: Any, view: Corners) -> list[tuple[str, np.ndarray]]:
+    """Names and edges [m] of regions in the plane that tell no shape of theirs, the edges of one in one."""
+    found = []
+    for zone in without_outline(around):
+        axes = Figure().add_subplot()
+        if draw_region(axes, zone, view, 1.0):
+            polygons = [
+                np.asarray(edge) for path in axes.collections[0].get_paths() for edge in path.to_polygons()
+            ]
+            found.append((f"forbidden by {type(zone).__name__}", apart(polygons)))
+    return found
+
+
+def _ball(center: np.ndarray, radius: float, colour: str, name: str, opacity: float) -> dict[str, Any]:
+    if len(center) == 2:
+        turn = np.linspace(0, 2 * np.pi, ROUND)
+        ring = center + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return _area(ring, colour, name, opacity)
+    around, down = np.meshgrid(np.linspace(0, 2 * np.pi, AROUND), np.linspace(0, np.pi, DOWN))
+    unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
+    return _surface(center[:, None, None] + radius * unit, colour, name, opacity)
+
+
+def _surface(points: np.ndarray, colour: str, name: str, opacity: float) -> dict[str, Any]:
+    """A surface of one colour through a grid of points, shape (3, rows, columns)."""
+    look: dict[str, Any] = {"colorscale": [[0, colour], [1, colour]], "showscale": False, "opacity": opacity}
+    # Light from all sides: the far side of a sphere would be black.
+    look["lighting"] = {"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 0.9}
+    look |= {"contours": {axis: {"highlight": False} for axis in "xyz"}}
+    places = {axis: rounded(part) for axis, part in zip("xyz", points, strict=True)}
+    return {"type": "surface", "name": name, "hoverinfo": "name", **places, **look}
+
+
+def _area(points: np.ndarray, colour: str, name: str, opacity: float) -> dict[str, Any]:
+    """A filled polygon in the plane."""
+    look = {"mode": "lines", "fill": "toself", "fillcolor": _clear(colour, opacity), "line": {"width": 0}}
+    return trace(points) | look | {"name": name, "hoverinfo": "name", "hoveron": "fills"}
+
+
+def _clear(colour: str, opacity: float) -> str:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity})"
+
+
+def _dashed(points: np.ndarray, name: str) -> dict[str, Any]:
+    look = {"color": FORBIDDEN.lower(), "width": 2, "dash": "dash"}
+    return trace(points) | {"mode": "lines", "line": look, "name": name, "hoverinfo": "name"}
+
+
+def _cone(surface: np.ndarray) -> list[dict[str, Any]]:
+    """The two sides of a cone in the plane; in space its surface and its rim."""
+    name = "approach cone"
+    if len(surface) == 2:
+        return [_dashed(surface[:, :, side].T, name) for side in (0, 1)]
+    return [_surface(surface, FORBIDDEN.lower(), name, 0.15), _dashed(surface[:, -1, :].T, name)]
+
+
+def _dot(place: np.ndarray, colour: str) -> dict[str, Any]:
+    marker = {"size": 9 if len(place) == 3 else 16, "color": colour, "line": {"width": 1, "color": "ink"}}
+    look = {"mode": "markers", "marker": marker, "name": "attractor", "hoverinfo": "name"}
+    return trace(place[None]) | look
