@@ -39,7 +39,7 @@ from dmoc.cli.options import (
     seen,
     show_answer,
     switch,
-    transfer_of,
+    not_a_team,
     writable,
 )
 
@@ -143,7 +143,7 @@ def effects(
     from dmoc.reports.tables import influence_table
     from dmoc.studies.effects import influences
 
-    problem = transfer_of(name, settings, "effects")
+    problem = not_a_team(name, settings, "effects")
     solution = dmoc.solve(problem, order=order, steps=steps, hold=hold)
     if not solution.success:
         show_answer(solution, None, as_json=False)
