@@ -35,11 +35,11 @@ from dmoc.cli.options import (
     attached,
     ends_at_once,
     fail,
+    not_a_team,
     problem_of,
     seen,
     show_answer,
     switch,
-    not_a_team,
     writable,
 )
 

@@ -119,8 +119,8 @@ def not_a_team(name: str, settings: list[str] | None, verb: str) -> Any:
     problem = problem_of(name, settings)[1]
     if hasattr(problem, "together"):
         raise ValueError(
-            f"dmoc {verb} takes a transfer or a mission, but {name} is a team of bodies; state the body that you "
-            "mean as a TransferProblem"
+            f"dmoc {verb} takes a transfer or a mission, but {name} is a team of bodies; state the body that "
+            "you mean as a TransferProblem"
         )
     return problem
 

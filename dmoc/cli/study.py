@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, not_a_team, writable
+from dmoc.cli.options import Json, Name, Settings, ends_at_once, not_a_team, switch, writable
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 

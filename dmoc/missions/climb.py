@@ -192,8 +192,8 @@ class Climb:
     ) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
 
-        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective by
-        about the part `still` of it.
+        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
+        by about the part `still` of it.
         """
         error, errors = None, self._errors(attempt)
         changes: list[float] = []

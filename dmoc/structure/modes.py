@@ -28,8 +28,8 @@ SINGULAR_NODES = 5
 # A limit of a control acts at a node if its multiplier is more than this part of the largest one [-].
 PUSHES = 1e-4
 # A limit that is kept to is in the way, or one that is not acts, where its multiplier is on the wrong side by
-# more than this part of the largest one [-], at so many nodes.
-WRONG_SIDE, WRONG_NODES = 1e-3, 2
+# more than this part of the largest one [-].
+WRONG_SIDE = 1e-3
 
 
 def names_of(problem: TransferProblem) -> tuple[tuple[str, str], ...]:
@@ -194,8 +194,9 @@ def lacking(
         for limit, side in enumerate(sides):
             wrong = np.maximum(-side * push[:, limit], 0.0) if side else np.abs(push[:, limit])
             wrong = np.where(_acting(problem, paths[i], least)[:, limit], wrong, 0.0)
-            wrong[[0, -1]] = 0.0
-            if np.sum(wrong > WRONG_SIDE * largest) < WRONG_NODES or wrong.max() <= most:
+            # At a joint it is where one limit gives way to another.
+            wrong[[0] * (i > 0) + [-1] * (i < len(kinds) - 1)] = 0.0
+            if wrong.max() <= most:
                 continue
             new = list(sides)
             new[limit] = _instead(names[limit], side, float(push[int(wrong.argmax()), limit]), problem, limit)

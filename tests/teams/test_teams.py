@@ -459,7 +459,8 @@ REFUSED = {
         Team([ONE, TWO, ONE]), guess=solve(Team([ONE, TWO]), steps=2)
     ),
     "structure and impulses": lambda: solve(Team([ONE, TWO]), structure=True),
-    "cannot be simulated as a whole": lambda: dmoc.simulate(Team([ONE, TWO])),
+    "use dmoc.simulate_team": lambda: dmoc.simulate(Team([ONE, TWO])),
+    "team must be a dmoc.Team": lambda: dmoc.simulate_team(ONE),
     "a team of bodies is not exported": lambda: dmoc.export(Team([ONE, TWO]), "nowhere"),
     "a check of a name that is taken": lambda: verify(solve(Team([ONE, TWO]), steps=2), more=[twin]),
     "no body is called 'x'; there": lambda: solve(Team([ONE, TWO]), steps=2).of("x"),
@@ -500,3 +501,14 @@ def test_orbits_take_as_many_steps_as_their_revolutions_need():
     assert [np.linalg.norm(leg.place[-1]) for leg in start.legs] == pytest.approx([1.0, 1.0])
     found = solve(team)
     assert found.success and all(check.ok for check in verify(found).checks)
+
+
+@pytest.mark.slow
+def test_bodies_that_cannot_pass_each_other_are_no_answer():
+    """In a corridor 0.4 m wide two bodies are to keep 0.5 m: they leap through each other between nodes."""
+    wall = KeepIn((-np.inf, -0.2), (np.inf, 0.2))
+    ends = State((0, 0), (0, 0)), State((4, 0), (0, 0))
+    there, back = (TransferProblem(1.0, a, b, 6.0, constraints=[wall]) for a, b in (ends, ends[::-1]))
+    found = solve(Team([there, back], [Apart(0.5)]), steps=12)
+    assert not found.success and found.status == "infeasible"
+    assert "apart body 1 and body 2 between nodes is broken by 0.1 m" in found.message
