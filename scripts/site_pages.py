@@ -1,4 +1,4 @@
-"""What MkDocs does besides docs/: README.md becomes the home page, notebooks become pages, linked files go along."""
+"""What MkDocs does besides docs/: README.md is the home page, notebooks are pages, linked files go along."""
 
 import json
 import posixpath
@@ -15,7 +15,9 @@ LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
 FORMULA = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # A row of the gallery: name, picture and what the problem is.
 ROW = re.compile(r"^\| \[(\w+)\]\((\S+\.png)\) \| ([^|]+) \|", re.MULTILINE)
-FIGURE = '<figure><a href="{1}"><img src="{1}" alt="{0}" loading="lazy"></a><figcaption>{0}</figcaption></figure>'
+FIGURE = (
+    '<figure><a href="{1}"><img src="{1}" alt="{0}" loading="lazy"></a><figcaption>{0}</figcaption></figure>'
+)
 
 
 def target(link, source):
@@ -78,5 +80,6 @@ def on_page_markdown(markdown, page, config, files):
     markdown = FORMULA.sub(formula, LINK.sub(led, markdown))
     if here == "gallery.md":
         figures = "\n".join(FIGURE.format(name, picture) for name, picture, _ in ROW.findall(markdown))
-        markdown += f'\n## Pictures\n\n<div class="pictures">\n{figures}\n</div>\n'
+        before, head, rows = markdown.partition("| problem |")
+        markdown = f'{before}<div class="pictures">\n{figures}\n</div>\n\n{head}{rows}'
     return markdown

@@ -1,15 +1,16 @@
-"""What README and the pages of docs/ show works: each section's commands and Python, in an empty folder."""
+"""What README and the pages of docs/ show works: all of a page, in its order, in an empty folder."""
 
 import re
 import shlex
 import subprocess
 import sys
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 import typer
-from shown import all_is_run, endings, ends_with, play, sections
+from shown import all_is_run, endings, ends_with, parts, play, sections
 
 import dmoc
 from dmoc.cli.app import app
@@ -19,29 +20,28 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 PAGES = {path.stem: path.read_text() for path in [README, *sorted((ROOT / "docs").glob("*.md"))]}
 ALL = "\n".join(PAGES.values())
-# tests/test_docs.py plays this one, and looks at what comes out
-SECTIONS = {
-    f"{page}: {title}": text
-    for page, whole in PAGES.items()
-    if page != "extending"
-    for title, text in sections(whole).items()
-}
-FIRST = ("README: Two commands", "README: A scene in ten lines")
-
-
-# Some sections need a package that comes with an extra; whoever runs the tests without has none of it.
+# tests/test_docs.py plays docs/extending.md, and looks at what comes out
+SHOWN = {page: text for page, text in PAGES.items() if page not in ("README", "extending") and parts(text)}
+FRONT = sections(PAGES["README"])
+COMMANDS, SCENE = "Two commands", "A scene in ten lines"
+# Some pages need a package that comes with an extra; whoever runs the tests without has none of it.
 NEEDED = {"report": "plotly"}
 
 
-def of_section(name):
-    package = NEEDED.get(name.partition(":")[0])
+def of_page(name):
+    package = NEEDED.get(name)
     missing = package is not None and find_spec(package) is None
     return pytest.param(name, marks=pytest.mark.skipif(missing, reason=f"{package} is not installed"))
 
 
-@pytest.mark.parametrize("section", [of_section(section) for section in SECTIONS if section not in FIRST])
-def test_what_pages_show_works(section, tmp_path, monkeypatch):
-    play(SECTIONS[section], tmp_path, monkeypatch)
+@pytest.mark.parametrize("page", [of_page(page) for page in SHOWN])
+def test_what_a_page_shows_works(page, tmp_path, monkeypatch):
+    play(SHOWN[page], tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("section", [section for section in FRONT if section not in (COMMANDS, SCENE)])
+def test_what_the_front_page_shows_works(section, tmp_path, monkeypatch):
+    play(FRONT[section], tmp_path, monkeypatch)
 
 
 def shape(text):
@@ -50,13 +50,13 @@ def shape(text):
 
 
 def test_the_first_commands_end_as_the_front_page_says(tmp_path, monkeypatch):
-    printed = play(SECTIONS[FIRST[0]], tmp_path, monkeypatch)["printed"]
+    printed = play(FRONT[COMMANDS], tmp_path, monkeypatch)["printed"]
     (shown,) = re.findall(r"^ {4}(Solved,.*?\n.*?)$", PAGES["README"], re.MULTILINE)
     assert shape(shown) in shape(printed["solve free_flyer"])
 
 
 def test_the_first_scene_has_the_numbers_of_the_front_page(tmp_path, monkeypatch):
-    names = play(SECTIONS[FIRST[1]], tmp_path, monkeypatch)
+    names = play(FRONT[SCENE], tmp_path, monkeypatch)
     effort, force = map(
         float, re.search(r"effort of ([\d.]+) N² s, its\s+largest force is ([\d.]+) N", ALL).groups()
     )
@@ -93,10 +93,15 @@ def test_commands_within_the_text_work_too(line, tmp_path):
     assert all((tmp_path / name).stat().st_size > 1000 for name in re.findall(r"--plot (\S+)", line))
 
 
+@cache
+def commands():
+    return typer.main.get_command(app)
+
+
 @pytest.mark.parametrize("line", sorted(set(INLINE)))
 def test_commands_within_the_text_are_ones_that_dmoc_has(line):
     verb, *words = [word for word in shlex.split(line)[1:] if word != "..."] or ["--help"]
-    program = typer.main.get_command(app)
+    program = commands()
     if verb.startswith("-"):
         assert verb in {"--help", "--version", "--install-completion"}
         return
@@ -115,13 +120,13 @@ def test_the_first_problem_names_everything_a_problem_is_made_of():
         dmoc.Shadow,
     )
     public = {name: getattr(dmoc, name) for name in dmoc.__all__}
-    parts = {name for name, part in public.items() if isinstance(part, type) and issubclass(part, kinds)}
+    named_parts = {name for name, part in public.items() if isinstance(part, type) and issubclass(part, kinds)}
     bases = {kind.__name__ for kind in kinds} | {"Conservative", "Force", "WeightedSum"}
     bases |= {"BodyConservative", "BodyForce"}
     page = PAGES["first_problem"]
     table = page[page.index("| what | names |") :].partition("\n\n")[0]
     named = set(re.findall(r"`(\w+)", table))
-    assert parts - bases <= named <= set(public)
+    assert named_parts - bases <= named <= set(public)
 
 
 def test_what_a_limit_too_small_ends_with():
@@ -154,3 +159,10 @@ def test_pictures_of_the_gallery_are_of_moderate_size():
 
 def test_the_front_page_is_short():
     assert len(PAGES["README"].split()) <= 1250
+
+
+def test_every_page_is_in_the_table_of_contents():
+    """If not: add a line to the nav of mkdocs.yml."""
+    nav = (ROOT / "mkdocs.yml").read_text().partition("\nnav:\n")[2]
+    pages = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")}
+    assert not [page for page in pages if f"- {page}\n" not in nav]

@@ -42,8 +42,7 @@ def solve(
     order: Order = None,
     steps: Steps = None,
     tol: Annotated[
-        float | None,
-        typer.Option(help="Relative error to reach, such as 1e-4; order and steps follow from it."),
+        float | None, typer.Option(help="Relative error to reach, such as 1e-4; sets order and steps.")
     ] = None,
     hold: Hold = False,
     settings: Settings = None,
@@ -56,12 +55,7 @@ def solve(
     guess: Annotated[Path | None, typer.Option(help="Start from this saved solution.")] = None,
     starts: Annotated[
         int,
-        typer.Option(
-            metavar="N",
-            min=1,
-            max=1000,
-            help="Try so many starting paths on a coarse mesh and refine the best optimum.",
-        ),
+        typer.Option(metavar="N", min=1, max=1000, help="Starting paths to try coarsely; the best is refined."),
     ] = 1,
     structure: Structure = None,
     impulses: Impulses = None,

@@ -81,7 +81,7 @@ def _cells(trial: Trial) -> dict[str, str]:
 def _reach(trials: Sequence[Trial]) -> Table:
     table = plain_table(["method", *map(_power, TARGETS)], numbers=slice(1, None), unbroken=slice(None), gap=1)
     for method, times in time_to_reach(trials).items():
-        table.add_row(method, *["-" if seconds is None else f"{1e3 * seconds:.3g}" for seconds in times])
+        table.add_row(method, *["-" if seconds is None else f"{1e3 * seconds:.0f}" for seconds in times])
     return table
 
 

@@ -452,7 +452,7 @@ def test_every_verb_has_an_example(run, verb):
 
 def test_switches_take_no_value_and_errors_point_to_the_verb(run):
     _, out, _ = run("solve", "--help")
-    assert re.search(r"--steps +<int>", out) and re.search(r"--hold +Forces", out)
+    assert re.search(r"--steps +<int>", out) and re.search(r"--hold +Keep forces", out)
     assert run("solve", "free_flyer", "--oder", 4)[2].endswith("(dmoc solve --help)\n")
     assert run("--oder")[2].endswith("(dmoc --help)\n")
     assert run("--version") == (0, f"dmoc {dmoc.__version__}\n", "")
