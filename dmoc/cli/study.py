@@ -62,10 +62,8 @@ def study(
         problem = not_a_team(name, settings, "study")
         methods = {} if against is None else load_methods(against)
         told = live.update if live else None
-        if hasattr(problem, "plan"):
-            trials = _of_mission(problem, (chosen, meshes, repeats, reference, compiled, told), cold, methods)
-        else:
-            trials = work_precision(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
+        measured = _of_mission if hasattr(problem, "plan") else work_precision
+        trials = measured(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
         save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time")
     if csv is not None:
@@ -82,13 +80,15 @@ def study(
         console.print(f"wrote {path}")
 
 
-def _of_mission(mission: Any, given: tuple, cold: bool, methods: dict) -> list:
+def _of_mission(
+    mission: Any, orders: Any, steps: Any, repeats: int, methods: dict, reference: Any, cold: bool, *rest: Any
+) -> list:
     """The trials of a mission, which no other method solves, and which has no coarse meshes on the way."""
     from dmoc.studies.of_missions import mission_precision
 
     if cold or methods:
         raise ValueError("--cold and --against are for transfers; a mission of legs has neither")
-    return mission_precision(mission, *given)
+    return mission_precision(mission, orders, steps, repeats, reference, *rest)
 
 
 def whole_numbers(name: str, text: str) -> list[int]:
