@@ -24,6 +24,7 @@ LAYERS = [
     ["scene"],
     ["motion"],
     ["guess", "results"],
+    ["ipopt"],
     ["nlp"],
     ["diagnosis"],
     ["solver", "checks"],

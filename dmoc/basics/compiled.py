@@ -128,3 +128,10 @@ def _tidy(place: Path) -> None:
     for old in sorted(place.glob("*.so"), key=lambda file: -file.stat().st_mtime)[MOST_KEPT:]:
         old.unlink(missing_ok=True)
         _record(old).unlink(missing_ok=True)
+
+
+def usable_cores() -> int:
+    """How many cores this process may use, where the system says so, else how many there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -15,7 +15,8 @@ class Named:
     """What is made with arguments by name; one that does not exist is refused with those that do."""
 
     def __new__(cls, *given: Any, **named: Any) -> Any:
-        known, any_name = _arguments(cls)
+        kind: Any = cls
+        known, any_name = _arguments(kind)
         if wrong := [name for name in named if name not in known and not any_name]:
             raise ValueError(_unknown(cls, wrong[0], known))
         return super().__new__(cls)
@@ -77,7 +78,7 @@ def _told(cls: type, lacking: list[str]) -> str:
     return f"{cls.__name__} has no {_call(cls, first)}{meant}. {purpose}{also}: see help(dmoc.{home.__name__})"
 
 
-def _nothing_told(cls: type) -> str:
+def _nothing_told(cls: Any) -> str:
     home = _home(cls, cls.one_of[0])
     calls = [name for name in cls.one_of if not name.endswith(("_of", "_at"))]
     own = next((_misspelt(cls, name) for name in calls if _misspelt(cls, name)), "")

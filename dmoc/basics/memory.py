@@ -1,9 +1,9 @@
 """Functions that were written down for one scene, remembered for the next solve of it in this process.
 
 Remembered are small CasADi functions of one point, step or node, never anything that grows with the mesh.
-A scene is known again by its parts and their numbers. One that holds an object that is not dmoc's own,
-a user's effect or a function of time, is written down anew every time: what such an object does may
-have changed without its numbers having changed.
+A scene is known again by its parts and their numbers. A user's own effect or function is known by its code
+and by all that the code looks at (`dmoc.basics.sources`). One of which that cannot be told, as it reads a file
+or belongs to a compiled module, is written down anew in every solve: what it does may have changed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from types import FunctionType
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+
+from dmoc.basics.sources import Sources
 
 # At most this many functions are remembered; the ones used longest ago go first.
 MOST = 500
@@ -57,6 +59,8 @@ class Shelf:
             shelf._held.clear()
 
 
+# Values of these kinds are their own identities.
+SIMPLE = (type(None), bool, int, str, float)
 # The functions that this process remembers, by the identity of the scene that they were written for.
 _functions = Shelf(MOST)
 
@@ -68,6 +72,15 @@ class _Meanwhile:
         self.shelf = Shelf(MOST, lasting=False)
         # An object whose address is in a key must live as long as the key.
         self.kept: dict[int, Any] = {}
+        # Identities of parts by their addresses, each with its part; None where it cannot be told.
+        self.known: dict[int, tuple[Any, Hashable]] = {}
+        self._patched: dict[type, bool] = {}
+
+    def is_patched(self, kind: type) -> bool:
+        """As `_is_patched`, looked at once."""
+        if kind not in self._patched:
+            self._patched[kind] = _is_patched(kind)
+        return self._patched[kind]
 
 
 _meanwhile: ContextVar[_Meanwhile | None] = ContextVar("meanwhile", default=None)
@@ -86,7 +99,7 @@ def unchanged() -> Iterator[None]:
 def remembered(make: Callable[[], T], *key: Any) -> T:
     """The result of `make`, or its earlier result for the same key."""
     try:
-        name = identity(key)
+        name = known(key)
     except TypeError:
         pass
     else:
@@ -94,6 +107,28 @@ def remembered(make: Callable[[], T], *key: Any) -> T:
     if (now := _meanwhile.get()) is None:
         return make()
     return now.shelf.get(_identity_now(key, now.kept), make)
+
+
+def known(value: Any) -> Hashable:
+    """The identity of a key: of each of its parts, found once while they do not change."""
+    if type(value) is tuple and len(value) <= MOST_ROWS:
+        return tuple(map(known, value))
+    now = _meanwhile.get()
+    if now is None or type(value) in SIMPLE:
+        return identity(value)
+    if id(value) not in now.known:
+        now.known[id(value)] = value, _told(value)
+    found = now.known[id(value)][1]
+    if found is None:
+        raise TypeError(value)
+    return found
+
+
+def _told(value: Any) -> Hashable | None:
+    try:
+        return identity(value)
+    except TypeError:
+        return None
 
 
 def _identity_now(value: Any, kept: dict[int, Any]) -> Hashable:
@@ -125,6 +160,11 @@ def forget() -> None:
 
 def identity(value: Any) -> Hashable:
     """Equal for values that are the same for every purpose; raises TypeError where that cannot be told."""
+    return Sources(_plain).of(value)
+
+
+def _plain(value: Any, of: Callable[[Any], Hashable]) -> Hashable | None:
+    """The identity of a number, a text, an array, a row of things, or a part of dmoc's own; None for others."""
     # Types must match exactly: a class that derives from one of them may do anything.
     kind = type(value)
     if kind in (type(None), bool, int, str):
@@ -134,16 +174,19 @@ def identity(value: Any) -> Hashable:
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.shape, value.dtype.str, value.tobytes()
     if kind in (tuple, list):
-        return tuple(map(identity, value)) if len(value) <= MOST_ROWS else _digest(value)
+        return tuple(map(of, value)) if len(value) <= MOST_ROWS else _digest(value)
     kind = value if isinstance(value, type) else kind
-    if not _is_own(kind) or _is_patched(kind):
+    if not _is_own(kind):
+        return None
+    now = _meanwhile.get()
+    if _is_patched(kind) if now is None else now.is_patched(kind):
         raise TypeError(kind)
     if isinstance(value, type):
         return value
     fields = getattr(value, "__dataclass_fields__", {})
     if not fields and vars(value):
         raise TypeError(kind)
-    return kind, tuple(identity(getattr(value, name)) for name in fields)
+    return kind, tuple(of(getattr(value, name)) for name in fields)
 
 
 def _digest(rows: Any) -> str:
@@ -153,8 +196,15 @@ def _digest(rows: Any) -> str:
     if set(map(type, numbers)) == {float} and (not nested or len(set(map(len, rows))) == 1):
         content = repr((len(rows), nested)).encode() + np.array(numbers).tobytes()
     else:
-        content = repr(tuple(map(identity, rows))).encode()
+        content = repr(tuple(map(_listed, rows))).encode()
     return hashlib.sha256(content).hexdigest()
+
+
+def _listed(value: Any) -> Hashable:
+    """The identity of an entry of a table: of a number, a text, or rows of them."""
+    if (found := _plain(value, _listed)) is None:
+        raise TypeError(value)
+    return found
 
 
 def _is_own(thing: Any) -> bool:

@@ -114,6 +114,12 @@ def adams(motion: dict[str, ca.SX], places: np.ndarray, tol: float, most_steps: 
     return ca.integrator("adams", "cvodes", motion, 0.0, places.tolist(), settings)
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The vector product of two vectors of three entries, for which NumPy's takes ten times as long."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
 def root(function: Callable[[float], float], a: float, b: float, tol: float) -> float:
     """Where a function changes its sign between a and b: false position by the Illinois rule.
 

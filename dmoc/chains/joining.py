@@ -19,7 +19,8 @@ from dmoc.configurations.base import Configuration
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint
-from dmoc.nlp.assembly import Block, kernel
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake, values_of, with_symbols

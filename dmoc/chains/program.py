@@ -14,9 +14,10 @@ from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
 from dmoc.chains.path import MissionPath, joint_cost
 from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows
 from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
-from dmoc.nlp.assembly import Assembly, Block, assemble, kernel
-from dmoc.nlp.ipopt import Answer, Watch, make_solver, run
-from dmoc.nlp.ipopt_options import NEAR, rounding, settings_for
+from dmoc.ipopt.options import NEAR, rounding, settings_for
+from dmoc.ipopt.run import Answer, Watch, make_solver, run
+from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
+from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_START, Layout
 from dmoc.nlp.units import Units, units_of
 from dmoc.parts.rows import Row
@@ -133,8 +134,8 @@ class MissionProgram:
 
     def assembly(self, compiled: bool = False) -> Assembly:
         """The functions of the NLP with their sparse derivatives; with `compiled` as machine code."""
-        scales = self.column_scales(), self.row_scales(), 1 / self.cost
-        return assemble(self.blocks, *scales, self.sizes[2], compiled)
+        scaling = Scaling.of(self.blocks, self.column_scales(), self.row_scales(), 1 / self.cost)
+        return assemble(self.blocks, scaling, self.sizes[2], compiled)
 
     def parameters(self) -> np.ndarray:
         """The parameters of all legs, then of both ends [SI]."""

@@ -13,7 +13,8 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import Block, kernel
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
@@ -57,6 +58,7 @@ def leg_program(
         placed.rows,
         placed.row_bounds,
         none,
+        np.empty(0),
     )
     return program, placed.blocks, stencils.parameter_count
 

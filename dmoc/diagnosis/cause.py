@@ -11,8 +11,8 @@ import numpy as np
 from dmoc.diagnosis.elastic import MET, MOST_ITERATIONS, Relaxation
 from dmoc.diagnosis.giving import LOOSER, Giving, Remedy
 from dmoc.diagnosis.relaxable import LEAST, Relaxable
+from dmoc.ipopt.run import Interrupt
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
@@ -228,7 +228,8 @@ def _unlimited(transfer: Relaxable) -> Cause | None:
     problem = replace(transfer.problem, actuator=free, constraints=transfer.given.constraints)
     nlp = transcribe_onto(problem, transfer.guess, units_of(problem, transfer.guess))
     watch = nlp.watch(problem, None, transfer.interrupt)
-    answer = nlp.run(nlp.solver({"ipopt.max_iter": MOST_ITERATIONS}, watch=watch), problem, transfer.guess)
+    solver = nlp.solver(watch=watch, limits={"ipopt.max_iter": MOST_ITERATIONS})
+    answer = nlp.run(solver, problem, transfer.guess)
     transfer.tell(replace(nlp.level(answer, 0.0), question="least effort without a limit"))
     path = replace(nlp.path(problem, answer), multipliers={})
     if answer.status != "solved" or transfer.leaps(path):

@@ -10,8 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.ipopt.run import ALWAYS, Follower, Interrupt, Watch, run
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import ALWAYS, Interrupt, Watch, run
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem
@@ -100,8 +100,8 @@ class Relaxation:
         nlp_parts, settings = self._parts(ca.sparsify(ca.DM(rows)), ca.vertcat(pick, pick), share)
         # CasADi holds no reference to its callbacks.
         sizes = [nlp_parts[name].numel() for name in ("x", "g", "p")]
-        self._watch = Watch(sizes[0], sizes[1], sizes[2], None, interrupt or Interrupt())
-        settings |= {"iteration_callback": self._watch}
+        self._follower = Follower(sizes[0], sizes[1], sizes[2], Watch(None, interrupt or Interrupt()))
+        settings |= {"iteration_callback": self._follower}
         self.solver = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings)
         self.warm = ca.nlpsol("relaxed", "ipopt", nlp_parts, settings | WARM)
         self._built = time.perf_counter() - begun

@@ -50,7 +50,9 @@ def refuse_undefined_rows(nlp: NLP, problem: TransferProblem, guess: DiscretePat
     x, p, parts = nlp.pack(guess), nlp.parameters(problem), nlp.assembly
     slopes, entries = parts.gradient(x, p)[1], parts.jacobian(x, p)[1]
     rows = np.isfinite(parts.constraints(x, p).full().ravel())
-    np.logical_and.at(rows, entries.sparsity().row(), np.isfinite(entries.nonzeros()))
+    finite = np.isfinite(entries.nz[:].full().ravel())
+    if not finite.all():
+        rows[np.array(entries.sparsity().row())[~finite]] = False
     cost = np.concatenate([parts.objective(x, p).full().ravel(), slopes.full().ravel()])
     if rows.all() and np.isfinite(cost).all():
         return

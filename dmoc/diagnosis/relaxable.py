@@ -11,8 +11,8 @@ from dmoc.basics.digits import down, time_unit, up
 from dmoc.basics.quaternions import normalised
 from dmoc.diagnosis.elastic import Relaxation, Relaxed
 from dmoc.diagnosis.giving import LOOSER, Giving, Limits, Remedy
+from dmoc.ipopt.run import Interrupt
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import Interrupt
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of

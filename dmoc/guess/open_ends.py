@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.numerics import cross
 from dmoc.effects.base import Attractor
 from dmoc.ends.base import Boundary
 from dmoc.guess.coast import coast
@@ -81,27 +82,35 @@ def windings_between(problem: TransferProblem, duration: float, states: Any, mor
     fits well, one with one revolution less and one with one more follow. With `more` there is only the path
     of that many revolutions more. There is none where an end is open or the orbits are too different.
     """
+    first = _winding(problem, duration, states, more or 0)
     attractor = problem.attraction.lone
-    if attractor is None or not (problem.start.anchored and problem.goal.anchored):
-        return []
-    start, goal = _from_center(problem, attractor, states)
-    spins = np.cross(*start), np.cross(*goal)
-    if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
+    if first is None or attractor is None:
         return []
     center = attractor.place(problem.dimension)
 
     def positions(winding: Winding, fractions: np.ndarray) -> np.ndarray:
         return winding.positions(fractions)[:, : problem.dimension] + center
 
-    windings = [Winding(attractor.mu, duration, start, goal, more or 0)]
-    if windings[0].eccentricity > MOST_ECCENTRIC or not windings[0].lasts:
-        return []
-    if more is None and abs(windings[0].bend) > MOST_BENT:
-        others = (Winding(attractor.mu, duration, start, goal, step) for step in (-1, 1))
-        windings += [other for other in others if other.turns != windings[0].turns and other.lasts]
+    windings = [first]
+    if more is None and abs(first.bend) > MOST_BENT:
+        others = (replace(first, more=step) for step in (-1, 1))
+        windings += [other for other in others if other.turns != first.turns and other.lasts]
     found = [(partial(positions, winding), winding.turns) for winding in windings]
-    sure = abs(windings[0].bend) <= MOST_BENT and windings[0].eccentricity < NEARLY_ROUND
+    sure = abs(first.bend) <= MOST_BENT and first.eccentricity < NEARLY_ROUND
     return [(*winding, sure) for winding in found]
+
+
+def _winding(problem: TransferProblem, duration: float, states: Any, more: int = 0) -> Winding | None:
+    """An even change between two states around a lone attractor; None where `windings_between` has no path."""
+    attractor = problem.attraction.lone
+    if attractor is None or not (problem.start.anchored and problem.goal.anchored):
+        return None
+    start, goal = _from_center(problem, attractor, states)
+    spins = cross(*start), cross(*goal)
+    if not spins[0] @ spins[1] > OPPOSITE * np.linalg.norm(spins[0]) * np.linalg.norm(spins[1]):
+        return None
+    winding = Winding(attractor.mu, duration, start, goal, more)
+    return winding if winding.eccentricity <= MOST_ECCENTRIC and winding.lasts else None
 
 
 def with_more_turns(problem: TransferProblem, base: DiscretePath, turns: int) -> DiscretePath:
@@ -120,12 +129,8 @@ def change_without_phase(problem: TransferProblem, states: Any) -> float | None:
 
     None where `windings_between` has no such path.
     """
-    if not windings_between(problem, problem.duration_bounds[0], states, 0):
-        return None
-    attractor = problem.attraction.lone
-    assert attractor is not None
-    start, goal = _from_center(problem, attractor, states)
-    return Winding(attractor.mu, problem.duration_bounds[0], start, goal).velocity_change
+    winding = _winding(problem, problem.duration_bounds[0], states)
+    return None if winding is None else winding.velocity_change
 
 
 def _from_center(problem: TransferProblem, attractor: Attractor, states: Any) -> list[tuple]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.numerics import cubic_spline, root
+from dmoc.basics.numerics import cross, cubic_spline, root
 from dmoc.guess.spiral import MOST_BENT, MOST_BEYOND, ROUNDS, SAMPLES_A_TURN, _axes
 
 
@@ -34,12 +34,13 @@ class Winding:
 
     def positions(self, fractions: np.ndarray) -> np.ndarray:
         """At these fractions of the duration, shape (count, 3) [m]."""
-        at, times = self._times(self.turns, self.bend)
-        elements, longitude = self._orbits(
-            cubic_spline(times / times[-1], at)(fractions), self.turns, self.bend
-        )
-        radius, axes = self._radius(elements, longitude), _axes(*elements[3:])
-        return radius[:, None] * (axes[0] * np.cos(longitude) + axes[1] * np.sin(longitude)).T @ self._frame
+        times = self._times(self.turns, self.bend)
+        at = cubic_spline(times / times[-1], self._grid(self.turns)[0])(fractions)
+        begin, swept = self._swept(self.turns)
+        elements, longitude = self._elements(self._even(at), self.bend), begin + at * swept
+        cos, sin = np.cos(longitude), np.sin(longitude)
+        radius, axes = self._radius(elements, cos, sin), _axes(*elements[3:])
+        return radius[:, None] * (axes[0] * cos + axes[1] * sin).T @ self._frame
 
     @property
     def eccentricity(self) -> float:
@@ -49,8 +50,10 @@ class Winding:
     @cached_property
     def turns(self) -> int:
         """Whole revolutions beyond the angle between the ends."""
-        # The time is nearly proportional to the angle, so their ratio corrects any first number.
-        turns = 10
+        # The time is nearly proportional to the angle, so their ratio corrects any first number: here that of
+        # circles with the parameters of both ends.
+        rate = 0.5 * sum(np.sqrt(self.mu / elements[0] ** 3) for elements, _ in self._ends)
+        turns = int(self.duration * rate / (2 * np.pi))
         for _ in range(ROUNDS):
             taken, known = self._time(turns) or self._time(turns + 1), turns
             turns = max(round((turns + 1) * self.duration / taken) - 1, 0)
@@ -61,7 +64,7 @@ class Winding:
     @property
     def lasts(self) -> bool:
         """Whether there is a way at all: from a place to itself there is none without a revolution."""
-        return self._time(self.turns) > 0
+        return self._swept(0)[1] > 0 or self.turns > 0
 
     @property
     def velocity_change(self) -> float:
@@ -86,28 +89,45 @@ class Winding:
         return root(excess, -most, most, 1e-6)
 
     def _time(self, turns: int, bend: float = 0.0) -> float:
-        return float(self._times(turns, bend)[1][-1])
+        return float(self._times(turns, bend)[-1])
 
-    def _times(self, turns: int, bend: float) -> tuple[np.ndarray, np.ndarray]:
-        """Fractions of the angle and the times there [s]: dt = r^2 / sqrt(mu p) dL."""
-        at = np.linspace(0.0, 1.0, SAMPLES_A_TURN * (turns + 1) + 1)
-        elements, longitude = self._orbits(at, turns, bend)
-        pace = self._radius(elements, longitude) ** 2 / np.sqrt(self.mu * elements[0])
-        pieces = 0.5 * (pace[1:] + pace[:-1]) * np.diff(longitude)
-        return at, np.append(0.0, np.cumsum(pieces))
+    def _times(self, turns: int, bend: float) -> np.ndarray:
+        """The times at the fractions of the angle [s]: dt = r^2 / sqrt(mu p) dL."""
+        at, time, cos, sin = self._grid(turns)
+        elements = self._elements(time, bend)
+        pace = self._radius(elements, cos, sin) ** 2 / np.sqrt(self.mu * elements[0])
+        times = np.zeros(len(at))
+        np.cumsum(pace[1:] + pace[:-1], out=times[1:])
+        return times * (0.5 * at[1] * self._swept(turns)[1])
 
-    def _orbits(self, at: np.ndarray, turns: int, bend: float) -> tuple[np.ndarray, np.ndarray]:
-        """p, f, g, h, k of the moment, shape (5, count), and L, at fractions of the angle."""
-        (first, begin), (last, end) = self._ends
-        end = begin + (end - begin) % (2 * np.pi) + 2 * np.pi * turns
-        time = self._even(at)
+    def _grid(self, turns: int) -> tuple[np.ndarray, ...]:
+        """Even fractions of the angle, those of the time of an even change, cosine and sine of the angle."""
+        if turns not in self._grids:
+            at = np.linspace(0.0, 1.0, SAMPLES_A_TURN * (turns + 1) + 1)
+            begin, swept = self._swept(turns)
+            longitude = begin + at * swept
+            self._grids[turns] = at, self._even(at), np.cos(longitude), np.sin(longitude)
+        return self._grids[turns]
+
+    @cached_property
+    def _grids(self) -> dict[int, tuple[np.ndarray, ...]]:
+        return {}
+
+    def _swept(self, turns: int) -> tuple[float, float]:
+        """The angle L at the start, and how much of it is passed."""
+        begin, end = (longitude for _, longitude in self._ends)
+        return begin, (end - begin) % (2 * np.pi) + 2 * np.pi * turns
+
+    def _elements(self, time: np.ndarray, bend: float) -> np.ndarray:
+        """p, f, g, h, k of the moment, shape (5, count), at fractions of the time of an even change."""
+        (first, _), (last, _) = self._ends
         bent = float(np.clip(bend, -MOST_BENT, MOST_BENT))
         speed, share = self._line(time + bent * time * (1 - time))
         # Beyond the largest bend a parabola in the speed leads above or below both orbits.
         upward = 1 if last[0] >= first[0] else -1
         speed = speed * (1 - 4 * upward * (bend - bent) * time * (1 - time))
         others = first[1:, None] + share * (last - first)[1:, None]
-        return np.concatenate([[speed**-2], others]), begin + at * (end - begin)
+        return np.concatenate([[speed**-2], others])
 
     def _line(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Root of 1/p, and the share of the change of the other elements, at fractions of the time."""
@@ -133,31 +153,31 @@ class Winding:
         return cubic_spline(angle / angle[-1], time)
 
     @staticmethod
-    def _radius(elements: np.ndarray, longitude: np.ndarray) -> np.ndarray:
-        return elements[0] / (1 + elements[1] * np.cos(longitude) + elements[2] * np.sin(longitude))
+    def _radius(elements: np.ndarray, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
+        return elements[0] / (1 + elements[1] * cos + elements[2] * sin)
 
     @cached_property
     def _frame(self) -> np.ndarray:
         """Rows: three axes, the last one along the mean angular momentum."""
-        spins = [np.cross(*state) for state in (self.start, self.goal)]
+        spins = [cross(*state) for state in (self.start, self.goal)]
         normal = sum(spin / np.linalg.norm(spin) for spin in spins)
         normal = normal / np.linalg.norm(normal)
-        first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        first = cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
         first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(normal, first), normal])
+        return np.stack([first, cross(normal, first), normal])
 
     @cached_property
     def _ends(self) -> list[tuple[np.ndarray, float]]:
         """(p, f, g, h, k) and L of the start and of the goal."""
         found = []
         for q, v in ((self._frame @ part for part in state) for state in (self.start, self.goal)):
-            spin = np.cross(q, v)
+            spin = cross(q, v)
             x, y, z = spin / np.linalg.norm(spin)
             # Elements count from the mean plane, so 1 + z vanishes only for opposite orbits, which are left
             # out.
             h, k = -y / (1 + z), x / (1 + z)
             first, second = _axes(h, k)
-            e = np.cross(v, spin) / self.mu - q / np.linalg.norm(q)
+            e = cross(v, spin) / self.mu - q / np.linalg.norm(q)
             elements = np.array([spin @ spin / self.mu, e @ first, e @ second, h, k])
             found.append((elements, float(np.arctan2(q @ second, q @ first))))
         return found

@@ -14,8 +14,8 @@ from dmoc.chains.path import MissionPath, kicks_of
 from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.iterate import SEEN, in_units
 from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
+from dmoc.ipopt.run import STATUSES, Answer
 from dmoc.missions.solution import Kick, MissionSolution
-from dmoc.nlp.ipopt import STATUSES, Answer
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, part_solution
 from dmoc.scene.clock import cautions_of, dates_of

@@ -11,14 +11,14 @@ import numpy as np
 from dmoc.chains.path import MissionPath, cold
 from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
+from dmoc.ipopt.options import NEAR
+from dmoc.ipopt.run import Answer, Interrupt, Watch
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
-from dmoc.nlp.ipopt import Answer, Interrupt, Watch
-from dmoc.nlp.ipopt_options import NEAR
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
@@ -129,7 +129,7 @@ class Climb:
             name, size = (program.name_of(*worst[0][1:]), worst[0][0]) if worst else ("", 0.0)
             return bool(self.progress(*program.numerics, iteration, cost, name, size))
 
-        return Watch(*program.sizes, tell if self.progress else None, self.interrupt)
+        return Watch(tell if self.progress else None, self.interrupt)
 
     def from_guess(self, path: MissionPath) -> Attempt:
         """The first answer: |F| rounded widely at first, and other durations where that fails."""

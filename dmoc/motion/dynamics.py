@@ -122,8 +122,7 @@ class Dynamics:
             rate = self._held(t, q, w, m, self._by_euler(t, q, w, m, f))
             return ca.Function("acceleration", [t, q, w, m, f], [ca.densify(rate)])
         dldq, dldv, push = self.point(t, q, v, m)
-        # The Euler-Lagrange equation d/dt dl/dv = dl/dq + F/m, whose left side is written out by the chain
-        # rule.
+        # The Euler-Lagrange equation d/dt dl/dv = dl/dq + F/m, its left side by the chain rule.
         change = ca.jacobian(dldv, q) @ v + ca.jacobian(dldv, t)
         rate = ca.solve(ca.jacobian(dldv, v), dldq + push + f / m - change)
         rate = self._held(t, q, v, m, rate)

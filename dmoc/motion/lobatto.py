@@ -99,8 +99,7 @@ def _scheme(degree: int) -> Scheme:
 def _lobatto_points(degree: int) -> np.ndarray:
     """Ends of [0, 1] and the roots of P_s', polished to round-off and made exactly symmetric."""
     slope = legendre.Legendre.basis(degree).deriv()
-    # The roots of a polynomial are eigenvalues with some rounding error; two steps of Newton's method remove
-    # it.
+    # The roots of a polynomial are eigenvalues with rounding errors, which two steps of Newton's method remove.
     inner = np.sort(np.real(slope.roots())) if degree > 1 else np.empty(0)
     for _ in range(2):
         inner = inner - slope(inner) / slope.deriv()(inner) if degree > 1 else inner

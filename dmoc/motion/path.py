@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,7 +127,7 @@ class DiscretePath(Brief):
         cosines = [np.sum(q[1:] * q[:-1], axis=1).min() for q in self.attitudes]
         return 2 * float(np.arccos(np.clip(min(cosines, default=1.0), -1.0, 1.0)))
 
-    @property
+    @cached_property
     def fractions(self) -> np.ndarray:
         """Fractions of the duration at the nodes, shape (nodes,)."""
         return node_fractions(self.mesh, scheme(self.order))
@@ -164,8 +165,7 @@ class DiscretePath(Brief):
             self._slope(place, velocity) * self.duration
             for place, velocity in ((0, self.start_velocity), (-1, self.goal_velocity))
         )
-        # The path must stay smooth, since its second differences are the forces: linear pieces would have
-        # jumps.
+        # The path must stay smooth, since its second differences are the forces.
         position = self._interpolated(old, new, ends)
         # Ends are often fixed numbers of the problem, to the last bit.
         position[0], position[-1] = self.position[0], self.position[-1]

@@ -8,15 +8,15 @@ over the evaluations, and nothing here knows mechanics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.compiled import compiled
-from dmoc.basics.numerics import chained, nonzeros_of, used_in
+from dmoc.nlp.kernel import Kernel
 
 # Sums of at most this many entries are made by picking one entry after the other; the rest of a longer one, as
 # for a free duration that is in every step, is added up at once.
@@ -24,81 +24,6 @@ MOST_PICKED = 8
 # A vector whose runs of equal numbers are at least this long on average is put together from one number a run:
 # that saves time in the build.
 LEAST_RUN = 100
-
-
-@dataclass(frozen=True)
-class Kernel:
-    """rows(z, d, p) and cost(z, d, p) of one evaluation, with their exact derivatives; see `kernel`.
-
-    Attributes
-    ----------
-    functions : dict of Function
-        "rows", "cost", "gradient" of the cost and the structural nonzeros of "jacobian" and "hessian". They
-        take z and those d and p that rows and cost depend on; "hessian" also takes multipliers and weight.
-    used : lists of int
-        Indices of those d and of those p.
-    jacobian, hessian : Sparsity
-        Of the rows, and of the upper triangle of weight cost + multipliers . rows.
-    costly : bool
-        Whether there is a cost at all.
-    slope : Function
-        (z, d, p, multipliers, weight) -> gradient of weight cost + multipliers . rows, the rows, the cost.
-    """
-
-    name: str
-    functions: dict[str, ca.Function]
-    used: tuple[list[int], list[int]]
-    jacobian: ca.Sparsity
-    hessian: ca.Sparsity
-    costly: bool
-    slope: ca.Function
-
-    @cached_property
-    def compiled(self) -> dict[str, ca.Function]:
-        """The functions as machine code where that can be had."""
-        return compiled(self.functions)
-
-
-def kernel(
-    name: str,
-    variables: ca.SX,
-    data: ca.SX,
-    parameters: ca.SX,
-    rows: ca.SX,
-    cost: ca.SX,
-    between: tuple[ca.SX, ca.SX] | None = None,
-) -> Kernel:
-    """The kernel of rows (a column) and a cost (a scalar).
-
-    They are expressions of local unknowns z, numbers d that differ between evaluations and the
-    parameters p of the NLP, each a column of symbols. `between` are symbols in them and the expressions of z, d
-    and p that these stand for: derivatives are made by the chain rule in them, which takes fewer instructions
-    where rows depend on few of them at a time.
-    """
-    multipliers, weight = ca.SX.sym("lam", rows.numel()), ca.SX.sym("sigma")
-    total = weight * cost + ca.dot(multipliers, rows)
-    if between is None:
-        hessian, slope = ca.hessian(total, variables)
-        jacobian, hessian = ca.jacobian(rows, variables), ca.triu(hessian)
-    else:
-        jacobian, hessian, slope = chained(rows, total, variables, *between)
-        rows, cost = ca.substitute([rows, cost], [between[0]], [between[1]])
-    outputs = {
-        "rows": ca.densify(rows),
-        "cost": ca.densify(cost),
-        "gradient": ca.densify(ca.gradient(cost, variables)),
-        "jacobian": nonzeros_of(jacobian),
-        "hessian": nonzeros_of(hessian),
-    }
-    used = used_in(data, rows, cost), used_in(parameters, rows, cost)
-    arguments = [variables, data[used[0]], parameters[used[1]]]
-    dual = [*arguments, multipliers, weight]
-    functions = {
-        kind: ca.Function(f"{name}_{kind}", dual if kind == "hessian" else arguments, [result])
-        for kind, result in outputs.items()
-    }
-    slope = ca.Function(name, dual, [ca.densify(part) for part in (slope, rows, cost)])
-    return Kernel(name, functions, used, jacobian.sparsity(), hessian.sparsity(), not cost.is_zero(), slope)
 
 
 @dataclass(frozen=True)
@@ -134,11 +59,30 @@ class Block:
 
 
 @dataclass(frozen=True)
+class Scaling:
+    """The numbers that depend on units and mesh, beside the blocks.
+
+    Unknowns are `columns` times x, row i is `rows[i]` times the sum of what blocks add to it, the objective is
+    `cost` times the sum of the costs; `values` are the numbers d of each block.
+    """
+
+    columns: np.ndarray
+    rows: np.ndarray
+    cost: float
+    values: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, blocks: Sequence[Block], columns: np.ndarray, rows: np.ndarray, cost: float) -> Scaling:
+        return cls(columns, rows, cost, tuple(block.values[block.kernel.used[0]] for block in blocks))
+
+
+@dataclass(frozen=True)
 class Assembly:
     """The functions of one NLP in scaled unknowns: x -> f, g and exact sparse derivatives.
 
-    `objective`, `constraints`, `gradient`, `jacobian` take (x, p); `hessian` takes
-    (x, p, lam_f, lam_g) and gives the upper triangle.
+    `objective`, `constraints`, `gradient`, `jacobian` take (x, p); `hessian` takes (x, p, lam_f, lam_g) and
+    gives the upper triangle. Where `parametric`, p ends with what `numbers` gives for a scaling: units and mesh
+    may then be others. `solvers` are those that were made for it.
     """
 
     x: ca.MX
@@ -150,17 +94,43 @@ class Assembly:
     gradient: ca.Function
     jacobian: ca.Function
     hessian: ca.Function
+    parametric: bool = False
+    solvers: dict[Any, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
 
-    def leaning(self, place: np.ndarray, weight: np.ndarray) -> Assembly:
-        """The same NLP whose objective has half the weighted sum of squares of x - place as a further term."""
-        x, p, away, sparse = self.x, self.p, self.x - place, ca.sparsify(ca.DM(weight))
+    def numbers(self, scaling: Scaling) -> np.ndarray:
+        """The last entries of p for other units or another mesh; none where these are constants."""
+        if not self.parametric:
+            return np.empty(0)
+        products = [
+            side[np.array(matrix.sparsity_out(place).row(), int)]
+            * scaling.columns[np.array(matrix.sparsity_out(place).get_col(), int)]
+            for side, matrix, place in ((scaling.rows, self.jacobian, 1), (scaling.columns, self.hessian, 0))
+        ]
+        values = [given.ravel(order="F") for given in scaling.values]
+        return np.concatenate([scaling.columns, scaling.rows, [scaling.cost], *values, *products])
+
+    @cached_property
+    def leaning(self) -> Assembly:
+        """The same NLP whose objective has half the weighted sum of squares of x - place as a further term.
+
+        The entries of place, then the weights, stand behind the other parameters.
+        """
+        x, size = self.x, self.x.numel()
+        place, weight = ca.MX.sym("place", size), ca.MX.sym("weight", size)
+        p, away = ca.vertcat(self.p, place, weight), x - place
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.g.numel())
-        slopes = self.gradient(x, p)[1] + sparse * away
-        hessian = self.hessian(x, p, lam_f, lam_g) + lam_f * ca.diag(sparse)
+        slopes = self.gradient(x, self.p)[1] + weight * away
+        hessian = self.hessian(x, self.p, lam_f, lam_g) + lam_f * ca.diag(weight)
+        f = self.f + 0.5 * ca.dot(weight * away, away)
+        jacobian = [ca.MX(*self.g.shape), self.jacobian(x, self.p)[1]]
         return replace(
             self,
-            f=self.f + 0.5 * ca.dot(sparse * away, away),
+            p=p,
+            f=f,
+            objective=ca.Function("objective", [x, p], [f]),
+            constraints=ca.Function("constraints", [x, p], [self.g]),
             gradient=ca.Function("nlp_grad_f", [x, p], [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
+            jacobian=ca.Function("nlp_jac_g", [x, p], jacobian, ["x", "p"], ["g", "jac_g_x"]),
             hessian=ca.Function(
                 "nlp_hess_l", [x, p, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]
             ),
@@ -169,36 +139,47 @@ class Assembly:
 
 def assemble(
     blocks: Sequence[Block],
-    column_scale: np.ndarray,
-    row_scale: np.ndarray,
-    cost_scale: float,
+    scaling: Scaling,
     parameter_count: int,
     compiled: bool = False,
+    parametric: bool = False,
 ) -> Assembly:
     """Map the blocks and scatter them.
 
-    Unknowns are `column_scale` times x, constraint i is `row_scale[i]` times its rows' sum, the
-    objective `cost_scale` times the sum of the costs. With `compiled` the kernels are machine code.
+    With `compiled` the kernels are machine code. If `parametric`, the numbers of the scaling are parameters
+    behind the others, in the order of `Assembly.numbers`; else they are constants.
     """
-    columns, rows = len(column_scale), len(row_scale)
-    x, parameters = ca.MX.sym("x", columns), ca.MX.sym("p", parameter_count)
+    columns, rows = len(scaling.columns), len(scaling.rows)
+    x, p = ca.MX.sym("x", columns), [ca.MX.sym("p", parameter_count)]
+
+    def number(values: np.ndarray) -> ca.MX:
+        if not parametric:
+            return _constant(values)
+        p.append(ca.MX.sym("number", len(values)))
+        return p[-1]
+
+    # The order of what follows is that of the parameters.
+    column_scale, row_scale, cost_scale = map(number, (scaling.columns, scaling.rows, np.array([scaling.cost])))
+    values = [
+        ca.reshape(number(given.ravel(order="F")), *given.shape) if parametric else ca.MX(ca.DM(given))
+        for given in scaling.values
+    ]
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    scaled, multipliers = x * _constant(column_scale), lam_g * _constant(row_scale)
-    vectors = scaled, parameters, multipliers, cost_scale * lam_f
+    vectors = x * column_scale, p[0], lam_g * row_scale, cost_scale * lam_f
     pieces: dict[str, list] = {kind: [] for kind in ("rows", "cost", "gradient", "jacobian", "hessian")}
-    for block in blocks:
-        for kind, piece in _evaluated(block, *vectors, compiled):
+    for block, numbers in zip(blocks, values, strict=True):
+        for kind, piece in _evaluated(block, numbers, *vectors, compiled):
             pieces[kind].append((piece, _places(block, kind, rows, columns)))
 
     f = cost_scale * sum((ca.sum2(piece) for piece, _ in pieces["cost"]), ca.MX(0))
-    g = _summed(pieces["rows"], row_scale)
-    slopes = _summed(pieces["gradient"], cost_scale * column_scale)
-    jacobian = _matrix(pieces["jacobian"], row_scale, column_scale)
-    hessian = _matrix(pieces["hessian"], column_scale, column_scale)
-    given = [x, parameters]
+    g = _summed(pieces["rows"], rows) * row_scale
+    slopes = _summed(pieces["gradient"], columns) * (cost_scale * column_scale)
+    jacobian = _matrix(pieces["jacobian"], scaling.rows, scaling.columns, number)
+    hessian = _matrix(pieces["hessian"], scaling.columns, scaling.columns, number)
+    given = [x, ca.vertcat(*p)]
     return Assembly(
-        x,
-        parameters,
+        given[0],
+        given[1],
         f,
         g,
         ca.Function("objective", given, [f]),
@@ -208,6 +189,7 @@ def assemble(
         ca.Function("nlp_grad_f", given, [ca.MX(1, 1), slopes], ["x", "p"], ["f", "grad_f_x"]),
         ca.Function("nlp_jac_g", given, [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
         ca.Function("nlp_hess_l", [*given, lam_f, lam_g], [hessian], ["x", "p", "lam_f", "lam_g"], ["h"]),
+        parametric,
     )
 
 
@@ -227,13 +209,18 @@ def _columns(vector: ca.MX, places: np.ndarray) -> ca.MX:
 
 
 def _evaluated(
-    block: Block, unknowns: ca.MX, parameters: ca.MX, multipliers: ca.MX, weight: ca.MX, compiled: bool
+    block: Block,
+    values: ca.MX,
+    unknowns: ca.MX,
+    parameters: ca.MX,
+    multipliers: ca.MX,
+    weight: ca.MX,
+    compiled: bool,
 ) -> Iterator[tuple[str, ca.MX]]:
     """Kind and value of every result of a block that is not zero by its structure, one column an evaluation."""
     kernel, count = block.kernel, block.count
-    d, used = kernel.used
-    p = [block.first + place for place in used]
-    given = [_columns(unknowns, block.columns), ca.DM(block.values[d]), ca.repmat(parameters[p], 1, count)]
+    p = [block.first + place for place in kernel.used[1]]
+    given = [_columns(unknowns, block.columns), values, ca.repmat(parameters[p], 1, count)]
     dual = [_columns(multipliers, block.targets), ca.repmat(weight, 1, count)]
     for kind, function in (kernel.compiled if compiled else kernel.functions).items():
         if function.numel_out(0) and (kernel.costly or kind not in ("cost", "gradient")):
@@ -253,18 +240,22 @@ def _places(block: Block, kind: str, rows: int, columns: int) -> np.ndarray:
     return {"rows": block.targets, "gradient": block.columns, "cost": np.empty(0)}[kind]
 
 
-def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], scale: np.ndarray) -> ca.MX:
-    """A vector whose entry i is scale_i times the sum of all entries of the pieces whose place is i."""
+def _summed(pieces: Sequence[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
+    """A vector whose entry i is the sum of all entries of the pieces whose place is i."""
     if not pieces:
-        return ca.MX(ca.DM.zeros(len(scale)))
+        return ca.MX(ca.DM.zeros(size))
     places = np.concatenate([place.ravel(order="F") for _, place in pieces])
-    counts = np.bincount(places, minlength=len(scale))
-    picked = _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts)
-    return picked * _constant(scale)
+    counts = np.bincount(places, minlength=size)
+    return _picked(pieces, np.argsort(places, kind="stable"), np.cumsum(counts) - counts, counts)
 
 
-def _matrix(pieces: Sequence[tuple], row_scale: np.ndarray, column_scale: np.ndarray) -> ca.MX:
-    """A sparse matrix of such sums: places are column * rows + row, and both scales are multiplied."""
+def _matrix(
+    pieces: Sequence[tuple], row_scale: np.ndarray, column_scale: np.ndarray, number: Callable
+) -> ca.MX:
+    """A sparse matrix of such sums, times both scales, whose product is a `number`.
+
+    Places are column * rows + row.
+    """
     rows, columns = len(row_scale), len(column_scale)
     if not pieces:
         return ca.MX(rows, columns)
@@ -276,7 +267,7 @@ def _matrix(pieces: Sequence[tuple], row_scale: np.ndarray, column_scale: np.nda
     begins = np.searchsorted(column, np.arange(columns + 1))
     pattern = ca.Sparsity(rows, columns, begins.tolist(), row.tolist())
     picked = _picked(pieces, order, starts, np.diff(starts, append=len(keys)))
-    return ca.MX(pattern, picked * _constant(row_scale[row] * column_scale[column]))
+    return ca.MX(pattern, picked * number(row_scale[row] * column_scale[column]))
 
 
 def _picked(pieces: Sequence[tuple], order: np.ndarray, starts: np.ndarray, counts: np.ndarray) -> ca.MX:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dmoc.guess.chart import Chart
-from dmoc.nlp.assembly import Kernel
-from dmoc.nlp.ipopt import Answer
+from dmoc.ipopt.run import Answer
+from dmoc.nlp.kernel import Kernel
 from dmoc.parts.rows import Row
 
 # The group of rows g(q) = 0 has this name.
@@ -134,6 +135,10 @@ class Layout:
 
     def scales(self) -> np.ndarray:
         """Scale of every place."""
+        return self._scales
+
+    @cached_property
+    def _scales(self) -> np.ndarray:
         return np.concatenate([*(group.scales.ravel() for group in self.groups), np.empty(0)])
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -12,12 +13,12 @@ import numpy as np
 from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
+from dmoc.ipopt.run import Answer
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import values_of
@@ -42,6 +43,7 @@ class Program:
     rows: Layout
     row_bounds: tuple[np.ndarray, np.ndarray]
     assembly: Assembly
+    numbers: np.ndarray
     chart: Chart | None = None
 
     def accepts(self, problem: TransferProblem) -> None:
@@ -66,10 +68,10 @@ class Program:
             raise ValueError(f"this NLP was built for another {', '.join(changed)}; transcribe the new problem")
 
     def parameters(self, problem: TransferProblem) -> np.ndarray:
-        """The NLP's parameter vector for a problem [SI]."""
+        """The NLP's parameter vector for a problem [SI], with the numbers of its units and mesh behind."""
         fixed = [] if problem.free_duration else [problem.duration_bounds[0]]
         head = [*self.units.origin, problem.start_time, problem.mass, *fixed]
-        return np.concatenate([head, *[values_of(part) for part in problem.adjustable_parts]])
+        return np.concatenate([head, *[values_of(part) for part in problem.adjustable_parts], self.numbers])
 
     def bounds(self, problem: TransferProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Scaled lower and upper bounds of the unknowns, then of the rows."""
@@ -203,7 +205,8 @@ class Program:
         body = self.dynamics.configuration
         return body.coordinates if len(body.coordinates.blocks) > 1 or body.surplus else None
 
-    def densities(self) -> Iterator[tuple[Key, Group, np.ndarray]]:
+    @cached_property
+    def densities(self) -> list[tuple[Key, Group, np.ndarray]]:
         """Key, group and the SI value of a scaled multiplier of 1, of every group.
 
         A multiplier of which there is one a node or a step is divided by the share of the duration that belongs
@@ -211,22 +214,24 @@ class Program:
         """
         shares = {"node": node_weights(self.mesh, self.scheme), "step": np.diff(self.mesh)}
         shares["control"] = shares["step" if self.hold else "node"]
+        found = []
         for layout, side in ((self.columns, "column"), (self.rows, "row")):
             for group in layout.groups:
                 share = shares.get(group.kind, np.ones(group.count))[:, None]
                 scale = 1 / group.scales if side == "column" else group.scales
-                yield Key(group.kind, side, group.name), group, self.units.cost * scale / share
+                found.append((Key(group.kind, side, group.name), group, self.units.cost * scale / share))
+        return found
 
     def path(self, problem: TransferProblem, answer: Answer) -> DiscretePath:
         """SI path and multipliers of an answer."""
         sides = {"column": answer.lam_x, "row": answer.lam_g}
-        multipliers = {key: group.of(sides[key.side]) * unit for key, group, unit in self.densities()}
+        multipliers = {key: group.of(sides[key.side]) * unit for key, group, unit in self.densities}
         return replace(self.unpack(answer.x, problem), multipliers=multipliers)
 
     def multipliers(self, path: DiscretePath) -> tuple[np.ndarray, np.ndarray]:
         """Scaled multipliers of unknowns and rows; 0 where a path has none."""
         sides = {"column": np.zeros(self.columns.size), "row": np.zeros(self.rows.size)}
-        for key, group, unit in self.densities():
+        for key, group, unit in self.densities:
             if key in path.multipliers:
                 sides[key.side][group.start : group.stop] = (path.multipliers[key] / unit).ravel()
         return sides["column"], sides["row"]

@@ -12,12 +12,12 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.options import rounding, settings_for
+from dmoc.ipopt.run import STATUSES, Answer, Interrupt, Watch, make_solver, run
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import STATUSES, Answer, Interrupt, Watch, make_solver, run
-from dmoc.nlp.ipopt_options import rounding, settings_for
 from dmoc.nlp.layout import Curved
 from dmoc.nlp.program import Program
 from dmoc.results.facts import Level, Provenance
@@ -51,14 +51,15 @@ class NLP(Program):
         warm: bool = False,
         carried: bool = False,
         watch: Watch | None = None,
+        limits: dict[str, Any] | None = None,
     ) -> ca.Function:
-        """Ipopt for this NLP; `warm` and `carried` as in `settings_for`."""
+        """Ipopt for this NLP; `warm` and `carried` as in `settings_for`, `limits` are further settings."""
         curved = self.chart is not None
         settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried, curved)
         # Rows that hold up to their rounding hold no better: a run that waits for that wanders to its end.
         held = "ipopt.acceptable_constr_viol_tol"
         settings[held] = max(settings[held], self._rounding)
-        return make_solver(self.assembly, settings, options, watch)
+        return make_solver(self.assembly, settings | (limits or {}), options, watch)
 
     def leaning(self, path: DiscretePath, strength: float) -> NLP:
         """The same NLP, whose scaled objective grows with the distance to a path on its mesh.
@@ -67,8 +68,8 @@ class NLP(Program):
         the positions.
         Where many paths cost the same the one next to the given path is the optimum, and Ipopt does not wander.
         """
-        weight = self._weights(strength)
-        return replace(self, assembly=self.assembly.leaning(self.pack(path), weight))
+        numbers = np.concatenate([self.numbers, self.pack(path), self._weights(strength)])
+        return replace(self, assembly=self.assembly.leaning, numbers=numbers)
 
     def pull(self, path: DiscretePath, near: DiscretePath, strength: float) -> float:
         """The largest scaled gradient, over its weight, by which an answer of `leaning` is no optimum [-]."""
@@ -96,8 +97,7 @@ class NLP(Program):
             steps = len(self.mesh) - 1
             return bool(progress(self.scheme.order, steps, iteration, self.objective(objective), name, size))  # type: ignore[misc]
 
-        sizes = self.columns.size, self.rows.size, self.assembly.p.numel()
-        return Watch(*sizes, tell if progress else None, interrupt)
+        return Watch(tell if progress else None, interrupt)
 
     def run(
         self, solver: ca.Function, problem: TransferProblem, path: DiscretePath, pinned: bool = False

@@ -15,7 +15,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import Block, assemble
+from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
 from dmoc.nlp.layout import Stencils
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.solving import NLP
@@ -23,12 +23,15 @@ from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
 
-# At most this many NLPs are held, to serve again for problems of the same structure, mesh and units.
+# At most this many NLPs are held, to serve again for problems of the same structure, mesh and units, and so
+# many of their functions, which serve on any mesh of as many steps and in any units.
 MOST_HELD = 16
 # An NLP of more nodes than this is not held: 16 smaller ones together take less than 100 MB.
 MOST_HELD_NODES = 2000
 # The NLPs that are held in this process, by structure, mesh, units and kind of control.
 _NLPS = Shelf(MOST_HELD)
+# Their functions, by structure and number of steps.
+_ASSEMBLIES = Shelf(MOST_HELD)
 
 
 def transcribe(
@@ -84,12 +87,13 @@ def transcribe_onto(
     dynamics = Dynamics.of(problem)
     key = (id(stencils), mesh, sizes, guess.hold, compiled)
 
+    small = len(guess.position) <= MOST_HELD_NODES
+
     def make() -> tuple[Stencils, NLP]:
         # The stencils are held with the NLP: once they were gone, another object might get their identity.
-        return stencils, _transcribed(problem, stencils, guess, units, compiled, dynamics, chart)
+        return stencils, _transcribed(problem, stencils, guess, units, compiled, chart, small)
 
-    small = chart is None and len(guess.position) <= MOST_HELD_NODES
-    _, nlp = _NLPS.get(key, make) if small else make()
+    _, nlp = _NLPS.get(key, make) if small and chart is None else make()
     return replace(nlp, problem=problem, dynamics=dynamics)
 
 
@@ -99,16 +103,20 @@ def _transcribed(
     guess: DiscretePath,
     units: Units,
     compiled: bool,
-    dynamics: Dynamics,
     chart: Chart | None,
+    small: bool,
 ) -> NLP:
     rule = scheme(guess.order)
     placed = Placement(problem, stencils, rule, guess.hold, guess.mesh, units, chart)
     columns, rows = placed.columns, placed.rows
-    scales = columns.scales(), rows.scales(), 1 / units.cost
-    assembly = assemble(placed.blocks, *scales, stencils.parameter_count, compiled)
-    numbers = units, columns, rows, placed.row_bounds, assembly
-    return NLP(problem, dynamics, rule, guess.hold, guess.mesh, *numbers, chart=chart)
+    scaling = Scaling.of(placed.blocks, columns.scales(), rows.scales(), 1 / units.cost)
+
+    def make() -> tuple[Stencils, Assembly]:
+        return stencils, assemble(placed.blocks, scaling, stencils.parameter_count, compiled, small)
+
+    _, assembly = _ASSEMBLIES.get((id(stencils), placed.steps, compiled), make) if small else make()
+    parts = units, columns, rows, placed.row_bounds, assembly, assembly.numbers(scaling)
+    return NLP(problem, Dynamics.of(problem), rule, guess.hold, guess.mesh, *parts, chart=chart)
 
 
 def unassembled(problem: TransferProblem, path: DiscretePath, units: Units) -> tuple[NLP, list[Block]]:
@@ -118,7 +126,8 @@ def unassembled(problem: TransferProblem, path: DiscretePath, units: Units) -> t
     derivatives: Any = None
     layouts = placed.columns, placed.rows, placed.row_bounds
     dynamics = Dynamics.of(problem)
-    nlp = NLP(problem, dynamics, rule, path.hold, path.mesh, units, *layouts, derivatives)
+    none = derivatives, np.empty(0)
+    nlp = NLP(problem, dynamics, rule, path.hold, path.mesh, units, *layouts, *none)
     return nlp, placed.blocks
 
 

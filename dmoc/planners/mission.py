@@ -183,7 +183,7 @@ class MissionPlanner:
         """The multipliers of unknowns, without those of joints, and of rows, group by group."""
         sides: dict[str, list[Part]] = {"column": [], "row": []}
         for name, scene, placed in zip(self.names, self.scenes, self.program.legs, strict=True):
-            known = [density for density in placed.program.densities() if density[2].size]
+            known = [density for density in placed.program.densities if density[2].size]
             for key, _, unit in known:
                 parts = multiplier_names(scene, key, [key for key, _, _ in known], unit.shape[1])
                 sides[key.side].append(

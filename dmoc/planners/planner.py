@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.run import Answer
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.motion.stability import refuse_unstable
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import check_mesh, transcribe_onto
 from dmoc.nlp.units import units_of

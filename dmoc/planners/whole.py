@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.ipopt.run import make_solver
 from dmoc.motion.mesh import node_weights
-from dmoc.nlp.ipopt import make_solver
 from dmoc.nlp.layout import Group
 from dmoc.planners.functions import all_steps, one_step, rows_of
 from dmoc.planners.mission import MissionPlanner, Part, identifier

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.digits import time_unit
 from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
@@ -12,6 +13,8 @@ from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
 from dmoc.motion.scales import path_scales
 from dmoc.scene.problem import TransferProblem
 
+# The times of switches are listed only if there are no more than this many: a message must stay short.
+MOST_SWITCHES = 12
 # A control is at a limit if it is within this part of its span from it [-]. If more than the same part of all
 # nodes [-] are in arcs between the limits, the path is singular.
 BETWEEN = 0.05
@@ -61,6 +64,20 @@ def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     return problem.start_time + path.duration * np.sort(at)
 
 
+def switches_in_words(problem: TransferProblem, path: DiscretePath) -> str:
+    """The times of the switches, such as "0.06, 4.45 s"; empty if there are none, or very many.
+
+    Of several within two steps of each other the first and the last: they are one burn that this mesh does not
+    resolve.
+    """
+    times = switch_times(problem, path)
+    steps = np.interp(times - problem.start_time, path.duration * path.mesh[:-1], np.diff(path.mesh))
+    groups = np.split(times, np.flatnonzero(np.diff(times) > 2 * path.duration * steps[:-1]) + 1)
+    size, unit = time_unit(problem.start_time + path.duration)
+    words = [f"{g[0] / size:.5g}" + f" to {g[-1] / size:.5g}" * (len(g) > 1) for g in groups if len(g)]
+    return f"{', '.join(words)} {unit}" if 0 < len(words) <= MOST_SWITCHES else ""
+
+
 def control_shares(problem: TransferProblem, control: np.ndarray) -> np.ndarray:
     """Where controls are between their limits, 0 to 1, one column each; those that the cost is linear in."""
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
@@ -74,9 +91,12 @@ def _shares(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
 
 def _linear(problem: TransferProblem, size: int) -> np.ndarray:
     """Which controls have limits on both sides and a cost that is linear in them."""
-    u = ca.SX.sym("u", size)
     lower, upper = (np.asarray(side, float) for side in problem.actuator.bounds(problem.dimension))
-    return np.isfinite(upper - lower) & (ca.hessian(_rate(problem, u), u)[0].nnz() == 0)
+    limited = np.isfinite(upper - lower)
+    if not limited.any():
+        return limited
+    u = ca.SX.sym("u", size)
+    return limited & (ca.hessian(_rate(problem, u), u)[0].nnz() == 0)
 
 
 def _rate(problem: TransferProblem, u: ca.SX) -> ca.SX:

@@ -13,7 +13,8 @@ import numpy as np
 from scipy import sparse
 
 from dmoc.basics.memory import Shelf
-from dmoc.nlp.assembly import Block, Kernel
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.kernel import Kernel
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 from dmoc.planners.numbers import Numbers, numbers_of_team

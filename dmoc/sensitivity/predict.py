@@ -9,8 +9,8 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import QUATERNION, normalised
+from dmoc.ipopt.run import Answer
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.layout import Layout
 from dmoc.planners.numbers import Number
 from dmoc.sensitivity.optimum import Optimum

@@ -14,10 +14,10 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.run import STATUSES, Interrupt
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
-from dmoc.nlp.ipopt import STATUSES, Interrupt
 from dmoc.nlp.solving import Progress
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
@@ -255,9 +255,9 @@ class Ladder:
             refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
         asked_of = nlp.leaning(guess, lean) if lean else nlp
-        solver = asked_of.solver((limits or {}) | (self.options or {}), bool(guess.multipliers), carried, watch)
+        solver = asked_of.solver(self.options, bool(guess.multipliers), carried, watch, limits)
         built = time.perf_counter() - begun
-        answer = nlp.run(solver, problem, guess, pinned)
+        answer = asked_of.run(solver, problem, guess, pinned)
         if lean:
             true = float(nlp.assembly.objective(answer.x, nlp.parameters(problem)))
             answer = replace(answer, objective=true)

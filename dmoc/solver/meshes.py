@@ -16,6 +16,7 @@ from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import TURN_A_STEP, flow_matrices, stable_from, steps_to_turn
 from dmoc.nlp.transcription import check_mesh
+from dmoc.results.switches import corners, is_singular
 from dmoc.scene.problem import TransferProblem
 
 # The last mesh has this many steps at each order: they reach an error of about 1e-4 to 1e-6 on a smooth
@@ -251,6 +252,22 @@ def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tu
     widths = [WIDEST_ROUNDING * 0.1**i for i in range(count)] + [rounding]
     repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
     return list(zip(repeated, widths + [rounding] * (len(meshes) - len(widths)), strict=True))
+
+
+def best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:
+    """The order that pays for a tolerance, by an answer on a coarse mesh and its objective, and why."""
+    if path.hold:
+        return 2, "held forces are second order whatever the scheme"
+    if is_singular(problem, path):
+        return 2, "controls stay between their limits where no cost decides on them"
+    if len(corners(problem, path, objective)):
+        return 4, "controls switch or limits set in"
+    return order_of_smooth(tol), "smooth"
+
+
+def order_of_smooth(tol: float) -> int:
+    """The order that pays where nothing switches and no limit sets in."""
+    return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest)
 
 
 def with_as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:

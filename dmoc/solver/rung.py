@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
+from dmoc.ipopt.run import Answer
 from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
 from dmoc.results.facts import Level
@@ -71,7 +72,7 @@ class Rung:
         """Whether the user ended it."""
         return self.answer.status == "stopped"
 
-    @property
+    @cached_property
     def path(self) -> DiscretePath:
         """The path of the answer, with its multipliers."""
         return self.nlp.path(self.problem, self.answer)

@@ -8,19 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.digits import time_unit
+from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.run import STATUSES
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import STATUSES
-from dmoc.results.estimate import LEAST_FALL, change, estimate, local_errors, rounding_cost
+from dmoc.results.estimate import (
+    LEAST_FALL,
+    change,
+    estimate,
+    estimate_at_once,
+    local_errors,
+    rounding_cost,
+)
 from dmoc.results.facts import Error
 from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
-from dmoc.results.switches import corners, has_linear_controls, is_singular, switch_times
+from dmoc.results.switches import corners, has_linear_controls, is_singular, switches_in_words
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
-from dmoc.solver.meshes import TRIAL_ORDER, trial_path, with_as_many_nodes
+from dmoc.solver.meshes import TRIAL_ORDER, best_order, order_of_smooth, trial_path, with_as_many_nodes
 from dmoc.solver.rung import OFF_OPTIMUM, Rung, at_rest
 from dmoc.solver.second_look import cheaper_revolutions
 
@@ -38,8 +45,6 @@ ROUNDING_SHARE = 0.5
 MOST_SHARPENING = 200
 # |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
 LEAST_ROUNDING = 1e-8
-# The times of switches are listed only if there are no more than this many: a message must stay short.
-MOST_SWITCHES = 12
 # Durations are equally good if, to first order, a change by this part of the duration costs no more than the
 # tolerance.
 EQUALLY_GOOD = 0.1
@@ -58,12 +63,11 @@ SLOW = 2.0
 FLAT = 0.03
 # A refinement of more iterations than this wanders: others take 20 to 90.
 LONG = 100
-# A refinement that is not held ends after this many iterations: then it is tried anew, and held.
+# One that is not held ends after this many: then it is tried anew, and held.
 LONGEST_FREE = 150
 # A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
 TIGHTER = 10.0
-# A mesh does no better if its change is more than this part of the one before [-]: the error that is estimated
-# from the fall of changes goes up and down.
+# A mesh does no better if its change is more than this part of the one before [-]: estimates go up and down.
 FALLING = 0.95
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
@@ -74,11 +78,16 @@ def climb_to_tolerance(
 ) -> Solution:
     """Refine until the estimated error is below a tolerance, on meshes that each cut steps of the one before.
 
-    A trial on a coarse mesh tells whether the controls switch or limits set in, and so which order
-    pays. All step ends are kept from mesh to mesh: the answer on one is a good start for the next, and
-    the change there tells the error.
+    A trial on a coarse mesh tells whether controls switch or limits set in, and so which order pays. Without
+    limits it may be the answer. All step ends are kept from mesh to mesh: the answer on one is a good start for
+    the next, and the change there tells the error.
     """
     first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
+    smooth = not (ladder.problem.limited or hold)
+    if smooth and order is None:
+        # Nothing can switch, so that no trial is needed.
+        order = order_of_smooth(tol)
+        first = starting_guess(ladder.problem, with_as_many_nodes(first, order), order, hold, guess)
     trial = flat_optimum(ladder, first)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
@@ -90,14 +99,18 @@ def climb_to_tolerance(
     if not trial.solved:
         return ladder.solution(trial, tolerance=tol)
     path = trial.path
-    order, reason = (order, "the order as given") if order else _best_order(ladder.problem, trial, tol)
+    given, cost = "smooth" if smooth else "the order as given", trial.level.objective
+    order, reason = (order, given) if order else best_order(ladder.problem, path, cost, tol)
     reason = "; ".join([*trial.notes, reason])
     if order != path.order:
         trial = ladder.solve_on(path.onto(with_as_many_nodes(path, order), order, hold))
         if not trial.solved:
             return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
-    return _Refinement(ladder, tol, local, reason).of(trial, order, hold)
+    refinement = _Refinement(ladder, tol, local, reason)
+    if smooth and refinement.meets_at_once(trial):
+        return refinement.settled(reason)
+    return refinement.of(trial, order, hold)
 
 
 @dataclass(frozen=True)
@@ -132,7 +145,7 @@ class _Refinement:
             if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
-                return self._settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
+                return self.settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
             if not self.changes and rung.pull > OFF_OPTIMUM:
                 rung = at_rest(self.ladder.try_on, rung, self.lean)
             fine = rung.path
@@ -149,9 +162,16 @@ class _Refinement:
             if met:
                 self._sharpen(rung, most)
             if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
-                return self._settled(self.reason)
+                return self.settled(self.reason)
             if self.worse == PATIENCE:
-                return self._settled(f"{self.reason}; finer meshes did no better")
+                return self.settled(f"{self.reason}; finer meshes did no better")
+
+    def meets_at_once(self, rung: Rung) -> bool:
+        """Whether an answer of a smooth problem meets the tolerance without a second mesh."""
+        found = estimate_at_once(self.problem, self.ladder.dynamics, rung.path, rung.level.objective)
+        self.errors[rung.number] = found.largest
+        self.best = _Found(rung, found) if found.largest <= self.tol else None
+        return self.best is not None
 
     def _refined(self, start: DiscretePath) -> Rung:
         """An answer on a finer mesh; where that wanders among paths that cost the same, one that is held."""
@@ -233,7 +253,7 @@ class _Refinement:
         over = self.best is not None and self.best.error.largest > self.tol
         return self.rounded > 0 and (over or self.rounded > ROUNDING_SHARE * self.tol)
 
-    def _settled(self, reason: str) -> Solution:
+    def settled(self, reason: str) -> Solution:
         """The best answer that was found, which need not be the last one."""
         assert self.best is not None
         words = _words(self.problem, self.best.rung.path, reason)
@@ -244,18 +264,6 @@ class _Refinement:
             return solution
         told = f"the estimated error is {reached:.1e}, you asked for {self.tol:g}; {STATUSES[NOT_MET].advice}"
         return replace(solution, success=False, status=NOT_MET, message=told)
-
-
-def _best_order(problem: TransferProblem, trial: Rung, tol: float) -> tuple[int, str]:
-    """The order that pays, and why."""
-    path = trial.path
-    if path.hold:
-        return 2, "held forces are second order whatever the scheme"
-    if is_singular(problem, path):
-        return 2, "controls stay between their limits where no cost decides on them"
-    if len(corners(problem, path, trial.level.objective)):
-        return 4, "controls switch or limits set in"
-    return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
 
 
 def _cuts_of(
@@ -286,15 +294,6 @@ def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
 
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
     """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
-    times = switch_times(problem, path)
-    # Several switches within two steps of each other are one burn that this mesh does not resolve.
-    near = (
-        2
-        * path.duration
-        * np.interp(times - problem.start_time, path.duration * path.mesh[:-1], np.diff(path.mesh))
-    )
-    groups = np.split(times, np.flatnonzero(np.diff(times) > near[:-1]) + 1)
-    size, unit = time_unit(problem.start_time + path.duration)
-    words = [f"{g[0] / size:.5g}" + f" to {g[-1] / size:.5g}" * (len(g) > 1) for g in groups if len(g)]
-    found = f"; switches at {', '.join(words)} {unit}" if 0 < len(words) <= MOST_SWITCHES else ""
-    return f"order {path.order}, {len(path.mesh) - 1} steps: {reason}{found}"
+    found = switches_in_words(problem, path)
+    words = f"order {path.order}, {len(path.mesh) - 1} steps: {reason}"
+    return f"{words}; switches at {found}" if found else words

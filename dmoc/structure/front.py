@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from dmoc.basics.arguments import short
 from dmoc.basics.files import as_path
+from dmoc.basics.memory import unchanged
 from dmoc.checks import verification
 from dmoc.checks.verification import Report
 from dmoc.nlp.solving import Progress
@@ -90,6 +91,7 @@ def solve(
 ) -> Any: ...
 
 
+@unchanged()
 def solve(
     problem: TransferProblem | Mission | Team,
     order: int | None = None,

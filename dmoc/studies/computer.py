@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
-from dmoc.basics.compiled import compiler, folder
-from dmoc.basics.cores import usable_cores
+from dmoc.basics.compiled import compiler, folder, usable_cores
 from dmoc.basics.memory import forget
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.solve import solve

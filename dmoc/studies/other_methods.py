@@ -16,10 +16,10 @@ import casadi as ca
 import numpy as np
 
 from dmoc.configurations.of_problem import configuration_of
+from dmoc.ipopt.options import settings_for, tolerance
+from dmoc.ipopt.run import make_solver, status_of
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.ipopt import make_solver, status_of
-from dmoc.nlp.ipopt_options import settings_for, tolerance
 from dmoc.scene.problem import TransferProblem
 
 

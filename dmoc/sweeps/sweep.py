@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.basics.cores import usable_cores
+from dmoc.basics.compiled import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
 from dmoc.sweeps.data import as_attributes, sweep_dataset, write_sweep
 from dmoc.sweeps.journal import Journal

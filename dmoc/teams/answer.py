@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from dmoc.basics.digits import lasting
+from dmoc.ipopt.run import STATUSES
 from dmoc.missions.answer import costs_of, worst_rows
-from dmoc.nlp.ipopt import STATUSES
 from dmoc.results.facts import Error, Provenance
 from dmoc.results.solution import NOT_MET, part_solution
 from dmoc.scene.clock import cautions_of, dates_of

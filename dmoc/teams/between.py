@@ -9,7 +9,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.chains.within import Placed
-from dmoc.nlp.assembly import Block, Kernel, kernel
+from dmoc.nlp.assembly import Block
+from dmoc.nlp.kernel import Kernel, kernel
 from dmoc.nlp.layout import Layout
 from dmoc.parts.rows import Row
 from dmoc.scene.team import Team

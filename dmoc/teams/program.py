@@ -11,8 +11,8 @@ import numpy as np
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.chains.within import Placed, leg_program
+from dmoc.ipopt.run import Answer
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.ipopt import Answer
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
 from dmoc.teams.between import BetweenBodies

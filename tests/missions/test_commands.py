@@ -10,7 +10,7 @@ import pytest
 from dmoc import Leg, Mission, State, load, solve
 from dmoc.cli.app import main
 from dmoc.cli.options import CHECK_FAILED, NOT_SOLVED, SOLVED
-from dmoc.nlp.ipopt import Interrupt
+from dmoc.ipopt.run import Interrupt
 
 HOHMANN = '''"""From one circular orbit to another by two impulses."""
 from dmoc import CircularOrbit, Coast, DeltaV, Impulse, Mission, PointGravity
@@ -90,8 +90,8 @@ def test_a_violation_is_told_in_the_size_of_its_unit():
     mission = Mission(2.0, State((0, 0), (0, 0)), State((1e6, 0), (0, 0)), legs)
     solution = solve(mission, order=2, steps=10)
     from dmoc.chains.program import MissionProgram
+    from dmoc.ipopt.run import Answer
     from dmoc.missions.answer import worst_rows
-    from dmoc.nlp.ipopt import Answer
 
     program = MissionProgram.of(mission, mission.stretches, solution.path)
     x = program.pack(solution.path)

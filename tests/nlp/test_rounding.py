@@ -2,7 +2,7 @@
 
 import pytest
 
-from dmoc.nlp.ipopt import SETTLED, _is_settled
+from dmoc.ipopt.run import SETTLED, _is_settled
 
 HOLDS = {"inf_pr": [1.0, 3e-10], "inf_du": [1.0, 4e-16], "mu": [1e-6, 5e-13]}
 

@@ -13,7 +13,6 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import short
-from dmoc.nlp.assembly import Assembly
 
 
 class Status(NamedTuple):
@@ -76,6 +75,11 @@ ALWAYS: dict[str, Any] = {
     "ipopt.nlp_scaling_method": "none",
 }
 
+# So many solvers are held for one NLP, if it has at most this many unknowns.
+MOST_SOLVERS, MOST_UNKNOWNS = 4, 20_000
+# Where nobody is told of the iterations, a watch looks at every so many of a small NLP: they take milliseconds.
+SELDOM = 5
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -98,19 +102,45 @@ def status_of(code: str) -> str:
 
 
 def make_solver(
-    parts: Assembly, settings: dict[str, Any], options: dict[str, Any] | None = None, watch: Watch | None = None
+    parts: Any,
+    settings: dict[str, Any],
+    options: dict[str, Any] | None = None,
+    watch: Watch | None = None,
 ) -> ca.Function:
     """The CasADi `nlpsol` Function of an NLP, with its exact derivatives.
 
-    With the user's option "jit" CasADi compiles f and g; the derivatives are compiled likewise.
+    `parts` is an `Assembly` of `dmoc.nlp`. The solver is held with a small NLP, and serves again for the same
+    settings. With the user's option "jit" CasADi
+    compiles f and g; the derivatives are compiled likewise.
 
     Raises
     ------
     ValueError
         If CasADi or Ipopt refuses one of the user's options.
     """
+    if options or parts.x.numel() > MOST_UNKNOWNS:
+        return _made(parts, settings, options, Follower.of(parts, watch) if watch else None)
+    # Two threads may solve at a time, each with an eye of its own on the iterations.
+    key = (*settings.items(), watch and watch.tell is None, threading.get_ident())
+    solver, follower = parts.solvers.pop(key, (None, None))
+    if solver is None or (follower is not None and follower.telling):
+        follower = Follower.of(parts, watch) if watch else None
+        solver = _made(parts, settings, None, follower)
+    if follower is not None and watch is not None:
+        follower.watch = watch
+    parts.solvers[key] = solver, follower
+    while len(parts.solvers) > MOST_SOLVERS:
+        parts.solvers.pop(next(iter(parts.solvers)))
+    return solver
+
+
+def _made(
+    parts: Any, settings: dict[str, Any], options: dict[str, Any] | None, follower: Follower | None
+) -> ca.Function:
     derivatives = {"jac_g": parts.jacobian, "hess_lag": parts.hessian, "grad_f": parts.gradient}
-    callback = {} if watch is None else {"iteration_callback": watch}
+    callback: dict[str, Any] = {} if follower is None else {"iteration_callback": follower}
+    if follower is not None and follower.watch.tell is None and parts.x.numel() <= MOST_UNKNOWNS:
+        callback["iteration_callback_step"] = SELDOM
     program = {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}
     given = options or {}
     try:
@@ -186,29 +216,50 @@ class Interrupt:
         self._pressed = True
 
 
-class Watch(ca.Callback):
-    """Follows the iterations: tells of each, and stops when `interrupt` has seen a Ctrl-C or `tell` says so.
+class Watch:
+    """Follows the iterations of one run: tells of each, and stops it when `interrupt` has seen a Ctrl-C.
 
-    CasADi holds no reference to a callback: whoever makes the solver keeps this alive while it runs. CasADi
-    would also print an exception of `tell` and go on: the watch stops the run and keeps the exception as
-    `error`, to be raised afterwards.
+    It stops as well when `tell` says so, (iteration, objective, x, g) -> whether to stop, scaled. CasADi would
+    print an exception of `tell` and go on: the watch stops the run and keeps the exception as `error`, to be
+    raised afterwards.
+    """
+
+    def __init__(self, tell: Callable[..., bool] | None, interrupt: Interrupt):
+        self.tell, self.interrupt, self.iteration = tell, interrupt, 0
+        self.error: BaseException | None = None
+        # CasADi holds no reference to its callback: this one lives as long as the run.
+        self.follower: Follower | None = None
+
+    def stops(self, at: dict[str, ca.DM]) -> bool:
+        """Whether to stop, after it has told of an iterate."""
+        stop = self.interrupt.seen
+        if self.tell is not None:
+            stop |= self.tell(self.iteration, float(at["f"]), np.array(at["x"]), np.array(at["g"]))
+        self.iteration += 1
+        return stop
+
+
+class Follower(ca.Callback):
+    """What CasADi calls every iteration; it asks the `watch` of the run.
 
     Parameters
     ----------
     columns, rows, parameters : int
         Sizes of the NLP.
-    tell : callable or None
-        (iteration, objective, x, g) -> whether to stop, scaled.
     """
 
-    def __init__(
-        self, columns: int, rows: int, parameters: int, tell: Callable[..., bool] | None, interrupt: Interrupt
-    ):
+    def __init__(self, columns: int, rows: int, parameters: int, watch: Watch):
         ca.Callback.__init__(self)
         self.sizes = {"f": 1, "x": columns, "lam_x": columns, "g": rows, "lam_g": rows}
-        self.parameters, self.tell, self.interrupt, self.iteration = parameters, tell, interrupt, 0
-        self.error: BaseException | None = None
-        self.construct("watch", {})
+        self.parameters, self.watch, self.telling = parameters, watch, False
+        self.construct("follower", {})
+
+    @classmethod
+    def of(cls, parts: Any, watch: Watch) -> Follower:
+        """The one of a run of this NLP."""
+        follower = cls(parts.x.numel(), parts.g.numel(), parts.p.numel(), watch)
+        watch.follower = follower
+        return follower
 
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
@@ -223,16 +274,11 @@ class Watch(ca.Callback):
         return ca.Sparsity.dense(self.sizes.get(ca.nlpsol_out(i), self.parameters))
 
     def eval(self, arguments: list) -> list:
+        self.telling = True
         try:
-            return [int(self._told(arguments))]
+            return [int(self.watch.stops(dict(zip(ca.nlpsol_out(), arguments, strict=True))))]
         except BaseException as error:
-            self.error = error
+            self.watch.error = error
             return [1]
-
-    def _told(self, arguments: list) -> bool:
-        stop = self.interrupt.seen
-        if self.tell is not None:
-            at = dict(zip(ca.nlpsol_out(), arguments, strict=True))
-            stop |= self.tell(self.iteration, float(at["f"]), np.array(at["x"]), np.array(at["g"]))
-        self.iteration += 1
-        return stop
+        finally:
+            self.telling = False
