@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from dmoc.effects import kepler_motion as kepler_motion
     from dmoc.effects import tabulated_motion as tabulated_motion
     from dmoc.effects import three_body as three_body
+    from dmoc.effects.air import TabulatedAtmosphere as TabulatedAtmosphere
+    from dmoc.effects.air import msis_atmosphere as msis_atmosphere
     from dmoc.effects.bodies import GravityGradient as GravityGradient
     from dmoc.effects.bodies import PivotGravity as PivotGravity
     from dmoc.effects.bodies import PlateDrag as PlateDrag

@@ -25,7 +25,7 @@ SHOWN = {page: text for page, text in PAGES.items() if page not in ("README", "e
 FRONT = sections(PAGES["README"])
 COMMANDS, SCENE = "Two commands", "A scene in ten lines"
 # Some pages need a package that comes with an extra; whoever runs the tests without has none of it.
-NEEDED = {"report": "plotly"}
+NEEDED = {"report": "plotly", "effects": "pymsis"}
 
 
 def of_page(name):

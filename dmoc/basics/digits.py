@@ -17,12 +17,13 @@ UNITS = {
     "m": ((1e4, 1e3, "km"),),
     "m/s": ((1e4, 1e3, "km/s"), (1e-2, 1.0, "m/s"), (0.0, 1e-3, "mm/s")),
     "N": ((1e7, 1e6, "MN"), (1e4, 1e3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e-3, "mN")),
+    "N m": ((1e4, 1e3, "kN m"), (1e-2, 1.0, "N m"), (0.0, 1e-3, "mN m")),
     "J": ((1e10, 1e9, "GJ"), (1e7, 1e6, "MJ"), (1e4, 1e3, "kJ"), (1e-2, 1.0, "J"), (0.0, 1e-3, "mJ")),
     "J/kg": ((1e7, 1e6, "MJ/kg"), (1e4, 1e3, "kJ/kg")),
 }
 # The astronomical unit [m], exact by definition (IAU 2012).
 ASTRONOMICAL_UNIT = 149_597_870_700.0
-# In words, where no axis has to bear it, great lengths and masses are told in these.
+# Great lengths and masses are told in these.
 GREAT = {
     "m": ((0.1 * ASTRONOMICAL_UNIT, ASTRONOMICAL_UNIT, "au"),),
     "kg": ((1e5, 1e3, "t"),),

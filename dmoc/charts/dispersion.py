@@ -31,9 +31,8 @@ def dispersion_figure(found: Dispersion, solution: Any) -> Figure:
     with matplotlib.rc_context(SETTINGS):
         page = Figure(figsize=(15, 5.2), layout="constrained")
         way, end, growth = page.subplots(1, 3)
-        page.suptitle(
-            f"{solution.provenance.problem_name}: {found.samples} flights with errors, seed {found.seed}"
-        )
+        name = solution.provenance.problem_name.replace("_", " ")
+        page.suptitle(f"{name}: {found.samples} flights with errors, seed {found.seed}")
         if axes == 1:
             _draw_line(way, found)
             _draw_states(end, found)
@@ -120,7 +119,11 @@ def _draw_growth(axes: Any, found: Dispersion) -> None:
         axes.plot(found.time / clock, linear[:, i] / size, label=f"{'xyz'[i]}, linear", **style)
         axes.plot(found.time[some] / clock, sampled[some, i] / size, "o", color=AXIS_COLOURS[i], markersize=4)
     axes.plot([], [], "o", color=PALE, markersize=4, label="of the flights")
-    axes.set(title="Standard deviation of the position", xlabel=f"time [{name}]", ylabel=f"[{unit}]")
+    axes.set(
+        title="Standard deviation of the position",
+        xlabel=f"time [{name}]",
+        ylabel=f"standard deviation [{unit}]",
+    )
     axes.legend()
 
 

@@ -163,7 +163,12 @@ def check(file: File, source: Source = None, worth: Worth = False, as_json: Json
 
 @app.command(epilog="Example: dmoc plot flight.nc --out flight.pdf")
 def plot(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help=f"{SAVED}, or the result of a sweep.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help=f"{SAVED}, the result of a sweep, or a point of it: map.nc:duration=12."
+        ),
+    ],
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .png if not given.")] = None,
     source: Source = None,
     dark: pages_command.Dark = False,
@@ -173,7 +178,10 @@ def plot(
     from dmoc.sweeps import data as sweep_data
 
     target = file.with_suffix(".png") if out is None else out
-    if sweep_data.is_sweep(file):
+    if (chosen := pages_command.point_of(file, out)) is not None:
+        solution, target = chosen
+        pages_command.draw(solution, target, dark=dark)
+    elif sweep_data.is_sweep(file):
         from dmoc.charts.sweep import save_sweep
 
         writable(target, drawn=True)

@@ -57,5 +57,31 @@ def draw(solution: Any, path: Path, verdict: Any = None, dark: bool = False) -> 
     save_figure(solution, path, verdict, dark=dark)
 
 
+def guess_from(path: Path) -> Any:
+    """What to start from: a saved solution, or the path of a point of a sweep."""
+    import dmoc
+
+    if path.exists() or ":" not in str(path):
+        return dmoc.load(path)
+    from dmoc.sweeps.points import start_from
+
+    return start_from(path)
+
+
+def point_of(file: Path, out: Path | None) -> tuple[Any, Path] | None:
+    """The answer of a point of a sweep, and where it is drawn; None where a file is named."""
+    if file.exists() or ":" not in str(file):
+        return None
+    from dmoc.sweeps.points import answer_of, split
+
+    known = split(file)
+    if known is None:
+        return None
+    name = known[1].replace("=", "_").replace(",", "_")
+    target = known[0].with_name(f"{known[0].stem}_{name}.png") if out is None else out
+    drawable(target)
+    return answer_of(*known), target
+
+
 def is_page(path: Path) -> bool:
     return path.suffix.lower() in (".html", ".htm")

@@ -28,7 +28,7 @@ from dmoc.cli.options import (
     watched,
     writable,
 )
-from dmoc.cli.pages import Dark, draw, drawable
+from dmoc.cli.pages import Dark, draw, drawable, guess_from
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -52,7 +52,9 @@ def solve(
     ] = None,
     dark: Dark = False,
     animate: Annotated[Path | None, typer.Option(help="Write a moving picture here (gif or mp4).")] = None,
-    guess: Annotated[Path | None, typer.Option(help="Start from this saved solution.")] = None,
+    guess: Annotated[
+        Path | None, typer.Option(help="Start from this saved solution, or a point of a sweep: map.nc:7.")
+    ] = None,
     starts: Annotated[
         int,
         typer.Option(metavar="N", min=1, max=1000, help="Starting paths to try coarsely; the best is refined."),
@@ -77,7 +79,7 @@ def solve(
     # what a problem file prints must not come between the lines of the JSON object
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         file, problem = problem_of(name, settings)
-        start: Any = None if guess is None else dmoc.load(guess)
+        start: Any = None if guess is None else guess_from(guess)
         unit = problem.objective.unit_with(problem.actuator)
         if starts > 1:
             start = best_start(problem, starts, order, hold, start, None if as_json or quiet else unit)

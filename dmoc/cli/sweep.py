@@ -35,6 +35,14 @@ if TYPE_CHECKING:
     from dmoc.sweeps.loop import SweepProgress
 
 
+Keep = Annotated[
+    str | None,
+    typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
+]
+
+Workers = Annotated[int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")]
+
+
 def sweep(
     problem: Name,
     vary: Annotated[
@@ -61,9 +69,8 @@ def sweep(
         bool,
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")
-    ] = None,
+    keep: Keep = None,
+    workers: Workers = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
     ] = None,
@@ -92,6 +99,7 @@ def sweep(
             out,
             settings=parse_settings(settings or ()),
             follow=follow,
+            keep=keep,
             workers=workers,
             scheduler=scheduler,
             restart=restart,

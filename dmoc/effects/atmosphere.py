@@ -99,7 +99,7 @@ class UniformAtmosphere(Atmosphere):
         checked(
             self,
             density=number("density", self.density, "kg/m^3", nonnegative=True),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
 
     def check_dimension(self, dimension: int) -> None:
@@ -157,7 +157,7 @@ class ExponentialAtmosphere(Atmosphere):
             scale_height=number("scale_height", self.scale_height, "m", positive=True),
             radius=number("radius", self.radius, "m", positive=True),
             rate=number("rate", self.rate, "rad/s"),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
         if self.height >= self.radius:
             raise ValueError(
@@ -257,7 +257,7 @@ class LinearDrag(Force):
         checked(
             self,
             coefficient=number("coefficient", self.coefficient, "N s/m", nonnegative=True),
-            wind=_wind(self.wind),
+            wind=checked_wind(self.wind),
         )
 
     def check_dimension(self, dimension: int) -> None:
@@ -268,5 +268,5 @@ class LinearDrag(Force):
         return -self.coefficient * (v if self.wind is None else v - self.wind.velocity(t, q))
 
 
-def _wind(value: Any) -> Wind | None:
+def checked_wind(value: Any) -> Wind | None:
     return value if value is None or isinstance(value, Wind) else Wind(value)

@@ -72,6 +72,11 @@ class Boundary(Duties):
         return True
 
     @property
+    def motion(self) -> Any:
+        """A function of the time [s] that gives the place [m] where it moves along a known path, else None."""
+        return None
+
+    @property
     def turns_body(self) -> bool:
         """Whether it says how the body is turned, too."""
         return False

@@ -124,6 +124,11 @@ class Moving(Boundary):
     def has_position(self) -> bool:
         return self.position is not None
 
+    @cached_property
+    def motion(self) -> ca.Function | None:
+        t = ca.SX.sym("t")
+        return None if self.position is None else ca.Function("place", [t], [self._moved(t)[0]])
+
     @property
     def turns_body(self) -> bool:
         return self.attitude is not None

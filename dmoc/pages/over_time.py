@@ -126,6 +126,7 @@ def _mass(solution: Any) -> list[Any]:
 
 
 def _draw_mass(axes: Any, solution: Any, late: float) -> None:
-    axes.plot(solution.time / late, solution.path.mass, color=PATH, label="_mass")
-    axes.set_ylabel("mass [kg]")
+    size, unit = readable(solution.path.mass, "kg")
+    axes.plot(solution.time / late, solution.path.mass / size, color=PATH, label="_mass")
+    axes.set_ylabel(f"mass [{unit}]")
     axes.set_title("Mass")

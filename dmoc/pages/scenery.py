@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dmoc.pages.traces import apart, rounded, trace
+from dmoc.pages.traces import apart, line, rounded, trace
 from dmoc.parts.outline import Ball, Box, Cone
-from dmoc.plots.style import FORBIDDEN
+from dmoc.plots.style import FORBIDDEN, PALE
 from dmoc.plots.surroundings import (
     Corners,
     attractors,
@@ -19,6 +19,8 @@ from dmoc.plots.surroundings import (
     outlines,
     room_edges,
     sources,
+    ways,
+    within,
     without_outline,
 )
 
@@ -41,6 +43,10 @@ def scenery_traces(around: Any, view: Corners, size: float) -> list[dict[str, An
         elif isinstance(shape, Cone):
             found += _cone(cone_surface(around, shape) / size)
     found += [_area(edges / size, zone, name, CLEAR) for name, edges in _regions(around, view)]
+    for way in ways(around):
+        look = line(within(way.points, view) / size, way.name, PALE, 1.5)
+        look["line"]["dash"] = "dot"
+        found.append(look)
     for (center, radius), source in zip(attractors(around), sources(around), strict=True):
         if (center > view[0]).all() and (center < view[1]).all():
             colour = colour_of(source).lower()

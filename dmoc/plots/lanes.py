@@ -145,14 +145,20 @@ def _draw_turning(axes: Any, solution: MissionSolution, late: float) -> None:
 
 def _draw_mass(axes: Any, solution: MissionSolution, late: float) -> None:
     """The mass, which falls as propellant burns and where a part is dropped."""
+    size, unit = readable(solution.legs[0].path.mass, "kg")
     for leg, look in zip(solution.legs, looks_of(solution.legs), strict=True):
-        axes.plot(leg.time / late, leg.path.mass, label="_leg", **look.style)
+        axes.plot(leg.time / late, leg.path.mass / size, label="_leg", **look.style)
     last = solution.legs[-1]
     if solution.final_mass < last.final_mass:
         # What goes away at the goal itself is behind the last leg.
         axes.plot(
-            last.time[-1] / late, solution.final_mass, "o", color=DARK, markersize=7, label="behind\nthe goal"
+            last.time[-1] / late,
+            solution.final_mass / size,
+            "o",
+            color=DARK,
+            markersize=7,
+            label="behind\nthe goal",
         )
     axes.set_ylim(bottom=0)
-    axes.set_ylabel("mass [kg]")
+    axes.set_ylabel(f"mass [{unit}]")
     axes.set_title("Mass")

@@ -38,7 +38,7 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
     for i, (body, path) in enumerate(paths.items()):
         colour = CHANNEL_COLOURS[i % len(CHANNEL_COLOURS)]
         axes.plot(*path.T, color=colour, linewidth=2.0, label=body or "path", zorder=4)
-        for place, marker, name in ((0, "o", "start"), (-1, "*", "goal")):
+        for place, marker, name in ((0, "o", "_start"), (-1, "*", "_goal")):
             style = {"markersize": 8 if marker == "o" else 13, "markerfacecolor": "white", "zorder": 6}
             axes.plot(*path[place, :, None], marker, markeredgecolor=colour, label=name, **style)
     shown = [*paths.values(), *_draw_links(axes, solution, fine, size)]
@@ -46,7 +46,7 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
         axes.plot(*swept.T / size, color=DARK, linestyle="--", linewidth=1.5, label=label, zorder=3)
         shown.append(swept / size)
     view = view_of(solution, size * np.vstack([piece.reshape(-1, solution.dimension) for piece in shown]))
-    proxies = draw_scene(axes, solution, (view[0] / size, view[1] / size), size)
+    proxies = [*_ends(), *draw_scene(axes, solution, (view[0] / size, view[1] / size), size)]
     if solution.dimension == 2:
         axes.dataLim.set_points(np.array(view) / size)
         axes.set_aspect("equal", adjustable="datalim")
@@ -63,6 +63,15 @@ def draw_bodies(axes: Any, solution: Solution) -> None:
     below = -0.06 if solution.dimension == 3 else -0.11
     columns = 3 if max(map(len, labels)) > LONG_LABEL else 4
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
+
+
+def _ends() -> list[Any]:
+    """Entries of the legend for the starts and goals of all bodies, whose colours they have in the picture."""
+    from matplotlib.lines import Line2D
+
+    style: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "white", "markeredgecolor": DARK}
+    marks = ("o", 8, "start"), ("*", 13, "goal")
+    return [Line2D([], [], marker=mark, markersize=size, label=name, **style) for mark, size, name in marks]
 
 
 def _fine(solution: Solution) -> tuple[np.ndarray, np.ndarray]:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.answers.ways import ends_of
 from dmoc.plots.lanes import lanes_of, looks_of
 from dmoc.plots.path import (
     ARROWS,
     FORCE,
+    PROJECTION,
     draw_arrows,
     extent_of,
     frame,
@@ -86,8 +88,10 @@ def scenery(solution: MissionSolution) -> Any:
             effects=effects,
             constraints=_once(one for leg in stretches for one in leg.constraints),
             attraction=Attraction.of(effects, solution.dimension),
+            ends=ends_of(solution),
         )
-    return SimpleNamespace(problem=around, dimension=solution.dimension, position=solution.position)
+    known = {name: getattr(solution, name) for name in ("dimension", "position", "time")}
+    return SimpleNamespace(problem=around, **known)
 
 
 def _once(parts: Any) -> list[Any]:
@@ -159,7 +163,7 @@ def _draw_path(axes: Any, solution: MissionSolution, view: Any, beside: bool) ->
             draw_triads(axes, leg, size)
         if solution.dimension == 3:
             floor = np.full(len(curve), view[0][2])
-            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label="its shadow", zorder=0)
+            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label=PROJECTION, zorder=0)
     _mark_joints(axes, np.array([curve[0] for curve in curves[1:]]).reshape(-1, solution.dimension))
     (tails, arrows, longest), of = _forces(solution)
     proxies += draw_arrows(axes, tails / size, arrows / size, longest, of)

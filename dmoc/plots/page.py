@@ -33,7 +33,15 @@ from dmoc.plots.style import (
     readable,
     speeds,
 )
-from dmoc.plots.turning import control_panels, draw_angle, draw_controls, draw_rates, draw_sphere, draw_wheels
+from dmoc.plots.turning import (
+    control_panels,
+    draw_angle,
+    draw_controls,
+    draw_rates,
+    draw_sphere,
+    draw_wheels,
+    limits_told,
+)
 from dmoc.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -175,15 +183,15 @@ def _draw_force_limits(axes: Any, solution: Solution, size: float, unit: str) ->
     if solution.problem is None:
         return
     actuator, n = solution.problem.actuator, solution.dimension
-    levels, words = np.array([actuator.force_limit() or np.inf]), "limit"
-    if actuator.labels(n)[:n] == tuple("xyz"[:n]):
-        sides = np.unique(np.concatenate([side[:n] for side in actuator.bounds(n)]))
-        if np.isfinite(sides).any():
-            levels, words = sides, "limit" if n == 1 else "limit of\na component"
-    else:
-        words = actuator.limit_label
+    along_axes = actuator.labels(n)[:n] == tuple("xyz"[:n])
+    levels = [(actuator.force_limit() or np.inf, "limit" if along_axes else actuator.limit_label)]
+    sides = np.array([np.asarray(side, float)[:n] for side in actuator.bounds(n)])
+    if along_axes and np.isfinite(sides).any():
+        each = "limit" if n == 1 else "limit of\na component"
+        known = limits_told(sides, [f"$F_{axis}$" for axis in "xyz"[:n]])
+        levels = [(level, each if told == "limit" else told) for level, told in known]
     largest = np.abs(solution.force).max(initial=0.0)
-    for level in levels[np.isfinite(levels)]:
+    for level, words in (known for known in levels if np.isfinite(known[0])):
         if abs(level) < FAR * largest:
             axes.axhline(level / size, label=words, **LIMIT)
         else:

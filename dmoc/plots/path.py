@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,17 @@ ARROWS = 20
 ARROW = 0.12
 # The name, unit and colour of the arrows along a path.
 FORCE = ("force", "N", PUSH)
+# So wide and so high may a box in space be [units of matplotlib's panel, which has 0.185 of them across]: the
+# numbers and labels stand around it, most of them below.
+ROOM = np.array([0.178, 0.155])
+# A flat box is seen from so much higher up [degrees].
+HIGHER = 25.0
+# Numbers from this on are long [-]: their signs and digits take the room of two short ones.
+LONG_NUMBER = 1000.0
+# A legend below a panel has room for so many letters, of which each mark with its gaps takes so many.
+LETTERS, MARK = 78, 7
+# What the line on the floor of the box is.
+PROJECTION = "projection"
 # Numbers with powers of ten between these two are written without one [-], as in all other panels.
 PLAIN = SETTINGS["axes.formatter.limits"]
 # In space they are so below this power of ten [-]: at the corner of the box numbers of five digits overlap.
@@ -55,8 +67,8 @@ def draw_path(axes: Any, solution: Solution, beside: bool = False) -> None:
     if solution.dimension == 3:
         floor = np.full(len(path), view[0][2])
         # Beside the axes of a body there is no room for its entry in the legend.
-        shadow = "_shadow" if solution.path.attitudes else "its shadow"
-        axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label=shadow, zorder=0)
+        below = "_projection" if solution.path.attitudes else PROJECTION
+        axes.plot(path[:, 0], path[:, 1], floor, color=PALE, linewidth=1.2, label=below, zorder=0)
         # The order is given, since matplotlib would hide the path behind surfaces that it passes in front of.
         axes.computed_zorder = False
     frame(axes, view, unit)
@@ -195,7 +207,7 @@ def draw_arrows(
     name, base, colour = of
     axes.quiver(*tails.T, *arrows.T, color=colour, **style).set_gid(name)
     unit_size, unit = readable(longest, base)
-    words = f"{name}, longest {longest / unit_size:.3g} {unit}"
+    words = f"{name}, longest {longest / unit_size:.4g} {unit}"
     return [Line2D([], [], color=colour, marker=">", markersize=7, label=words)]
 
 
@@ -216,8 +228,9 @@ def frame(axes: Any, view: Corners, unit: str) -> None:
     for i, name in enumerate(names):
         axis = getattr(axes, f"{name}axis")
         axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
-        # a short side has room for few numbers
-        axis.set_major_locator(MaxNLocator(2 + round(4 * spans[i] / spans.max())))
+        # a short side has room for few numbers, and any side for few that are long
+        most = 4 if np.abs(view).max() < LONG_NUMBER else 3
+        axis.set_major_locator(MaxNLocator(2 + round(most * spans[i] / spans.max())))
         # a power of ten of its own, as for a low z, would stand on the label
         axis.set_major_formatter("{x:g}")
         # matplotlib measures this distance along the other two sides; make it the same for all three
@@ -227,10 +240,21 @@ def frame(axes: Any, view: Corners, unit: str) -> None:
         # marks on a side of the box reach beyond the rectangle that would clip them; its sides set the layout
         artist.set_clip_on(False)
         artist.set_in_layout(False)
-    # a tall box would reach into the legend below; a flat one that is enlarged would leave the page at the left
-    axes.set_box_aspect(spans, zoom=0.88 if tall else 1.0)
     axes.set_anchor("N")
-    axes.view_init(elev=25, azim=-60)
+    # What is flat is seen from higher up: it would be a line otherwise.
+    flat = float(np.clip(1 - 2 * spans[2] / spans[:2].max(), 0.0, 1.0))
+    axes.view_init(elev=25 + HIGHER * flat, azim=-60)
+    axes.set_box_aspect(spans, zoom=_zoom(axes, view, spans))
+
+
+def _zoom(axes: Any, view: Corners, spans: np.ndarray) -> float:
+    """How much larger than matplotlib draws it a box in space may be to fill its panel, and not to be cut."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    axes.set_box_aspect(spans)
+    corners = np.array(list(product(*zip(*view, strict=True))))
+    seen = np.stack(proj_transform(*corners.T, axes.get_proj())[:2], axis=1)
+    return float((ROOM / np.ptp(seen, axis=0)).min())
 
 
 def legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
@@ -239,10 +263,20 @@ def legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
     if beside:
         axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0))
         return
-    # Three rows would reach into the line below the panels.
-    columns = 3 if 4 < len(labels) <= 6 else 4
+    columns = _columns(labels)
     below = -0.06 if axes.name == "3d" else -0.11
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
+
+
+def _columns(labels: list[str]) -> int:
+    """In how many columns a legend is as wide as its panel at most."""
+    for columns in (4, 3):
+        rows = -(-len(labels) // columns)
+        widths = [max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows)]
+        # Three rows would reach into the line below the panels, where two do.
+        if sum(widths) + MARK * len(widths) <= LETTERS and not (columns == 4 and 4 < len(labels) <= 6):
+            return columns
+    return 3
 
 
 def entries_once(axes: Any, more: Sequence[Any] = ()) -> tuple[list[Any], list[str]]:

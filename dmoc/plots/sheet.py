@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 # Units in the headline have this sign for a square.
 SQUARED = "\u00b2"
 
+# What changes by less than this part of itself does not change, in a picture [-].
+STEADY = 1e-6
 # What a picture on a light background has in these colours, one on a dark background has in those: letters and
 # lines, the page itself, and what would be too dark on it.
 ON_DARK = {
@@ -81,6 +83,7 @@ def new_panels(page: Figure, dimension: int, wide: bool, count: int) -> tuple[An
 def arrange(page: Figure, panels: Sequence[Any], wide: bool, time_unit: str) -> None:
     """Legends of the panels over time, and one axis of time for all of them."""
     for panel in panels:
+        steady(panel)
         where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.05)}
         if wide:
             where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.3), "ncol": 2}
@@ -92,6 +95,14 @@ def arrange(page: Figure, panels: Sequence[Any], wide: bool, time_unit: str) -> 
         panel.set_xlabel(f"time [{time_unit}]")
     if not wide:
         page.align_ylabels(panels)
+
+
+def steady(panel: Any) -> None:
+    """Show a curve that changes by rounding alone as the level that it is."""
+    low, high = panel.get_ylim()
+    level = 0.5 * (low + high)
+    if high - low < STEADY * abs(level):
+        panel.set_ylim(sorted((0.95 * level, 1.05 * level)))
 
 
 def entitle(page: Figure, solution: Any, report: Report | None, late: float, late_unit: str) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.digits import UNITS
+from dmoc.basics.digits import GREAT, UNITS
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
@@ -68,6 +68,8 @@ SETTINGS: Any = {
     "axes.spines.right": False,
     "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-3, 5),
+    # Numbers on an axis are those of the curve, not what is left of them beside a number at its end.
+    "axes.formatter.useoffset": False,
 }
 
 # A curve has about this many points in all ...
@@ -81,7 +83,7 @@ LIMIT: dict[str, Any] = {"color": PALE, "linestyle": (0, (7, 4)), "linewidth": 1
 def readable(values: Any, unit: str) -> tuple[float, str]:
     """(size of the unit to draw in, its name) for values given in SI."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    choices = UNITS.get(unit, ()) if largest else ()
+    choices = (*GREAT.get(unit, ()), *UNITS.get(unit, ())) if largest else ()
     return next(((size, name) for least, size, name in choices if largest >= least), (1.0, unit))
 
 

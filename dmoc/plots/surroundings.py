@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.answers.ways import Way, ways_of
 from dmoc.effects.base import Attractor
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.outline import Ball, Box, Cone, Shape
-from dmoc.plots.style import ALIKE, ATTRACTOR, BODIES, DARK, FORBIDDEN
+from dmoc.plots.style import ALIKE, ATTRACTOR, BODIES, DARK, FORBIDDEN, PALE
 from dmoc.results.solution import Solution
 
 # Zones and attractors are shown up to this part of the extent beyond the path [-].
@@ -18,6 +19,8 @@ REACH = 0.5
 # A forbidden region without a shape of its own is found on a grid of this many places along each axis.
 REGION_POINTS = 600
 
+# The ways of ends that move have these lines in turn.
+WAYS = ((0, (1, 2)), (0, (6, 3)))
 # The lower and the upper corner of a view or a box, in metres or in the unit of the drawing.
 Corners = tuple[np.ndarray, np.ndarray]
 
@@ -52,7 +55,20 @@ def _boxes(solution: Solution) -> list[Corners]:
         elif isinstance(shape, Cone):
             rim = cone_surface(solution, shape).reshape(solution.dimension, -1)
             boxes.append((rim.min(axis=1), rim.max(axis=1)))
-    return boxes
+    return boxes + [(way.points.min(axis=0), way.points.max(axis=0)) for way in ways(solution)]
+
+
+def ways(solution: Solution) -> list[Way]:
+    """The ways of ends that move."""
+    if solution.problem is None or not solution.dimension:
+        return []
+    return ways_of(solution.problem, (solution.time[0], solution.time[-1]))
+
+
+def within(points: np.ndarray, view: Corners) -> np.ndarray:
+    """Points of a line, with gaps where it is out of view: nothing else cuts lines in space."""
+    inside = np.all((points >= view[0]) & (points <= view[1]), axis=1)
+    return np.where(np.asarray(inside)[:, None], points, np.nan)
 
 
 def attractors(solution: Solution) -> list[tuple[np.ndarray, float]]:
@@ -84,6 +100,9 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
         if draw_region(axes, zone, view, size):
             name = f"forbidden by {type(zone).__name__}"
             proxies.append(Patch(facecolor=FORBIDDEN, edgecolor=FORBIDDEN, alpha=0.5, label=name))
+    for i, way in enumerate(ways(solution)):
+        line = within(way.points / size, view)
+        axes.plot(*line.T, color=PALE, linewidth=1.0, linestyle=WAYS[i % len(WAYS)], label=way.name, zorder=1)
     largest = max((source.mu for source in sources(solution)), default=1.0)
     for (center, radius), source in zip(attractors(solution), sources(solution), strict=True):
         colour = colour_of(source)
@@ -146,7 +165,12 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
         axes.add_patch(disc)
         return
     # The poles are left out: a triangle without area has no shade.
-    around, down = np.meshgrid(np.linspace(2 * np.pi, 0, 31), np.linspace(1e-3, np.pi - 1e-3, 16))
+    cut = ((center - radius < view[0]) | (center + radius > view[1])).any()
+    # What the view cuts needs a finer grid for an edge without teeth.
+    parts = 120 if cut else 30
+    around, down = np.meshgrid(
+        np.linspace(2 * np.pi, 0, parts + 1), np.linspace(1e-3, np.pi - 1e-3, parts // 2 + 1)
+    )
     unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
     surface = center[:, None, None] + radius * unit
     # Matplotlib does not clip surfaces in space.
@@ -154,6 +178,7 @@ def _draw_ball(axes: Any, center: np.ndarray, radius: float, view: Corners, colo
     surface = np.where(inside, surface, np.nan)
     light = LightSource(azdeg=225, altdeg=50)
     style = {"color": colour, "alpha": 0.35, "linewidth": 0, "lightsource": light, "zorder": 1}
+    style |= {"rcount": parts, "ccount": parts}
     axes.plot_surface(*surface, **style).set_gid(name)
 
 

@@ -77,7 +77,7 @@ def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], bes
         _arrows(axes, tails / size, arrows / size, style["color"])
         if solution.dimension == 3:
             floor = np.full(len(curve), view[0][2])
-            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label="_shadow", zorder=0)
+            axes.plot(curve[:, 0], curve[:, 1], floor, color=PALE, linewidth=1.2, label="_projection", zorder=0)
     if solution.dimension == 3:
         axes.computed_zorder = False
     frame(axes, view, unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -143,11 +144,11 @@ def draw_controls(axes: Any, solution: Solution, late: float, panel: tuple[str, 
         axes.plot(times / late, values / size, label=name, **_channel(i))
     actuator = solution.problem.actuator if solution.problem else None
     if actuator is not None:
-        sides = np.concatenate([np.asarray(side, float)[channels] for side in actuator.bounds(3)])
+        sides = np.array([np.asarray(side, float)[channels] for side in actuator.bounds(3)])
         largest = np.abs(control).max(initial=0.0)
-        for level in np.unique(sides[np.isfinite(sides)]):
+        for level, words in limits_told(sides, labels):
             if abs(level) <= 4 * largest:
-                axes.axhline(level / size, label="limit", **LIMIT)
+                axes.axhline(level / size, label=words, **LIMIT)
         if unit == "N m" and not np.isfinite(sides).any() and (limit := actuator.torque_limit()) is not None:
             # The limit is one of the magnitude.
             total = np.linalg.norm(control, axis=1) / size
@@ -156,6 +157,19 @@ def draw_controls(axes: Any, solution: Solution, late: float, panel: tuple[str, 
     name = "torque" if unit == "N m" else "force"
     axes.set_ylabel(f"{name} [{shown}]")
     axes.set_title(f"{name.capitalize()} of the actuator" + (", held over each step" if solution.hold else ""))
+
+
+def limits_told(sides: np.ndarray, names: Sequence[str]) -> list[tuple[float, str]]:
+    """Each finite limit of several curves once, with the names of those that it is for unless it is for all.
+
+    `sides` are the lower and the upper limits, shape (2, curves).
+    """
+    found = []
+    for level in np.unique(sides[np.isfinite(sides)]):
+        ours = [name for name, pair in zip(names, sides.T, strict=True) if level in pair]
+        words = "limit" if len(ours) == len(names) else f"limit of {', '.join(ours)}"
+        found.append((float(level), words))
+    return found
 
 
 def _draw_firings(axes: Any, times: np.ndarray, control: np.ndarray, unit: str) -> None:

@@ -52,10 +52,14 @@ COLUMNS = {
     "solve_s": Column(np.nan, "s", "time spent in Ipopt"),
     "verify_s": Column(np.nan, "s", "time spent on checks"),
 }
+# Paths are a variable of the result where they are kept; empty where not solved.
+PATH = Column("", "1", "path, controls and multipliers of the answer, packed")
 
 
-def sweep_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any]) -> Dataset:
-    """The dataset of all records, in the order of the points.
+def sweep_dataset(
+    plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any], keeps: bool = False
+) -> Dataset:
+    """The dataset of all records, in the order of the points; with their paths if it `keeps` them.
 
     A result that has the name of a swept parameter is called found_<name>.
     """
@@ -69,7 +73,7 @@ def sweep_dataset(plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mappi
         about = {"units": _netcdf_unit(parameter.unit), "long_name": parameter.description or parameter.name}
         coordinates[parameter.name] = (dimensions if plan.sampled else dimensions[i : i + 1], values, about)
     variables: dict[str, Any] = {}
-    for name, column in COLUMNS.items():
+    for name, column in (COLUMNS | ({"path": PATH} if keeps else {})).items():
         given = [record.get(name) for record in records]
         filled = [column.empty if value is None else value for value in given]
         kind = object if isinstance(column.empty, str) else type(column.empty)

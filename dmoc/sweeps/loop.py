@@ -61,6 +61,11 @@ class Sweep:
             wave += 1
         return self._records()
 
+    def path(self, point: int) -> str | None:
+        """The path of a point's answer, None where it is not solved."""
+        wave, record = self.best[point]
+        return self.journal.path_at(wave, point) if record.get("success") else None
+
     def _records(self) -> list[dict[str, Any]]:
         return [self.best[point][1] for point in range(self.plan.size)]
 

@@ -40,6 +40,7 @@ def sweep(
     tol: float | None = None,
     hold: bool = False,
     follow: bool = False,
+    keep: str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
@@ -77,6 +78,9 @@ def sweep(
     follow : bool
         Start every point from the answer of the one before along the last dimension, in runs of
         eight: up to twice as fast, but on the branch of local optima that the run begins with.
+    keep : str
+        "paths": the file holds the path of every answer, too, a few kilobytes each, so that a point of it can
+        be a guess or a picture (`dmoc solve --guess map.nc:duration=12`, `dmoc plot map.nc:duration=12`).
     workers : int
         Processes; as many as there are cores if not given.
     scheduler : str
@@ -111,6 +115,8 @@ def sweep(
         raise ValueError(
             f"workers must be a whole number of at most {MOST_WORKERS} and at least 1; got {workers!r}"
         )
+    if keep not in (None, "paths"):
+        raise ValueError(f"keep must be 'paths' or nothing; got {keep!r}")
     numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold}
     facts = _facts(file, plan, fixed, numerics | {"follow": follow})
     if plan.sampled:
@@ -122,12 +128,15 @@ def sweep(
 
     with Journal(out, facts | {"vary": plan.listing()}, restart) as journal:
         with _pool(workers, scheduler) as pool:
-            records = Sweep(plan, journal, pool, task, progress).run(follow)
+            under_way = Sweep(plan, journal, pool, task, progress)
+            records = under_way.run(follow)
         if all(record["status"] == "refused" for record in records):
             journal.remove()
             raise ValueError(f"every point was refused, the first with: {records[0]['message']}")
         created = {"created": datetime.now(UTC).isoformat(timespec="seconds")}
-        data = sweep_dataset(plan, records, as_attributes(facts) | created)
+        if keep is not None:
+            records = [record | {"path": under_way.path(point)} for point, record in enumerate(records)]
+        data = sweep_dataset(plan, records, as_attributes(facts) | created, keep is not None)
         write_sweep(data, out)
         journal.remove()
     return data

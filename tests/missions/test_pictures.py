@@ -125,7 +125,7 @@ def test_impulses_stand_on_the_path_and_at_a_primer_of_one():
     assert pytest.approx(np.array([kick.position for kick in solution.impulses])) == arrows.XY
     both = np.array([arrows.U, arrows.V]).T
     assert both / kicks == pytest.approx(np.full((2, 2), both[0, 0] / kicks[0, 0]))
-    assert "impulse, longest 0.155 m/s" in legend(path)
+    assert "impulse, longest 0.1547 m/s" in legend(path)
     marks = [line for line in primer.lines if line.get_label() == "impulse"]
     assert [mark.get_ydata()[0] for mark in marks] == pytest.approx([1.0, 1.0], abs=1e-5)
     assert [mark.get_xdata()[0] for mark in marks] == pytest.approx([0.0, solution.duration])

@@ -218,8 +218,9 @@ def test_zones_in_space_and_limits_of_each_axis_are_drawn():
     drawn = panels(solved("3-D"))
     spheres = [shape for shape in drawn["path"].collections if shape.get_gid() == "keep-out zone"]
     assert len(spheres) == 3
-    assert {"keep-out zone", "its shadow"} <= set(labels(drawn["path"]))
-    assert levels(drawn["force"], "limit of a component") == [-0.6, -0.5, 0.5, 0.6]
+    assert {"keep-out zone", "projection"} <= set(labels(drawn["path"]))
+    assert levels(drawn["force"], "limit of $F_x$, $F_y$") == [-0.6, 0.6]
+    assert levels(drawn["force"], "limit of $F_z$") == [-0.5, 0.5]
     assert {"$F_x$", "$F_y$", "$F_z$", "$|F|$"} <= set(labels(drawn["force"]))
 
 

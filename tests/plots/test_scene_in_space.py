@@ -64,7 +64,7 @@ def test_the_label_of_an_axis_stands_beside_its_numbers(tilt, radius, mu):
     boxes = [(text.get_text(), text.get_window_extent().padded(-2)) for text in texts]
     assert not [(a, b) for i, (a, one) in enumerate(boxes) for b, other in boxes[:i] if one.overlaps(other)]
     names = [axis.get_label().get_text() for axis in every]
-    unit = {1.5e11: "$10^{8}$ km", 2.4e7: "$10^{4}$ km", 6e6: "km"}[radius]
+    unit = {1.5e11: "au", 2.4e7: "$10^{4}$ km", 6e6: "km"}[radius]
     assert names == [f"{name} [{unit}]" for name in "xyz"]
 
 

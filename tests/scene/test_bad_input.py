@@ -122,6 +122,14 @@ MAKES = {
         "box": 1.0,
         "smoothing": 1e-5,
     },
+    "TabulatedAtmosphere": {
+        "heights": (1.0, 2.0, 3.0, 4.0),
+        "densities": (4.0, 3.0, 2.0, 1.0),
+        "radius": 3.0,
+        "rate": 0.1,
+        "wind": None,
+        "source": "a table",
+    },
     "ExponentialAtmosphere": {
         "density": 1.0,
         "height": 0.0,
