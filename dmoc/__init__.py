@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 # The one list of public names, for type checkers and editors as for Python. Python itself imports a name
 # on its first use only, so that `dmoc --help` answers before CasADi is loaded.
 if TYPE_CHECKING:
+    from dmoc.basics.unknown import Unknown as Unknown
     from dmoc.bodies.ball_torques import BallTorque as BallTorque
     from dmoc.bodies.pointing import PointingKeepIn as PointingKeepIn
     from dmoc.bodies.pointing import PointingKeepOut as PointingKeepOut
@@ -73,6 +74,11 @@ if TYPE_CHECKING:
     from dmoc.ends.poses import rotation as rotation
     from dmoc.exports.export import export as export
     from dmoc.films.film import animate as animate
+    from dmoc.flights.flight import Flight as Flight
+    from dmoc.flights.flown import fly as fly
+    from dmoc.identification.estimate import Estimate as Estimate
+    from dmoc.identification.identify import identify as identify
+    from dmoc.identification.identify import plan_for as plan_for
     from dmoc.legs.encounters import Bounce as Bounce
     from dmoc.legs.encounters import Flyby as Flyby
     from dmoc.legs.encounters import Frame as Frame

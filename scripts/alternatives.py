@@ -28,9 +28,10 @@ from scipy.interpolate import CubicSpline
 
 from dmoc import Attitude, Pose, State, TransferProblem
 from dmoc.basics.quaternions import conjugate, normalised, times
+from dmoc.configurations.acting import specific_lagrangian
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.starting import starting_guess
-from dmoc.motion.dynamics import Dynamics, specific_lagrangian
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.units import units_of
 from dmoc.studies.accuracy import Formulation

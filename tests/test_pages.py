@@ -75,6 +75,7 @@ ELSEWHERE = {
     "python scripts/effects_cost.py --write": "it writes the page; a test of the studies runs it",
     "python scripts/accuracy.py --write": "it writes the page, in minutes",
     "python scripts/campaign.py --each 50 --journal campaign.jsonl --write": "it takes an hour",
+    "python scripts/identification.py": "it takes minutes and the extra study; tests hold what it shows",
     "python scripts/gallery.py": "it writes the pictures; tests/scene/test_problems.py solves every problem",
 }
 # Commands within a line of text that name all they need; those of the gallery are run by the tests of problems.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.plain import unbroken
+from dmoc.basics.unknown import is_unknown
 
 # A number may be this large [in its SI unit]: products of six of them still stay below 1e308, where floating
 # point overflows, and nothing that moves comes near it.
@@ -27,7 +28,7 @@ FreeVector = Sequence[float | None] | np.ndarray | None
 
 
 def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative: bool = False) -> float:
-    """`value` as a finite float, or a ValueError that names it."""
+    """`value` as a finite float, or a ValueError that names it; an `Unknown` stays one."""
     try:
         result = math.nan if isinstance(value, (bool, np.bool_, str, bytes)) else float(value)
         several = np.ndim(value) > 0 if isinstance(value, np.ndarray) else False
@@ -46,6 +47,8 @@ def number(name: str, value: Any, unit: str, positive: bool = False, nonnegative
         raise ValueError(
             f"{name} must be of a size between {SMALLEST:g} and {LARGEST:g}{_in(unit)}; got {result:g}"
         )
+    if is_unknown(value):
+        return value
     return result if abs(result) >= SMALLEST else 0.0
 
 

@@ -22,6 +22,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from dmoc.basics.sources import Sources
+from dmoc.basics.unknown import Unknown
 
 # At most this many functions are remembered; the ones used longest ago go first.
 MOST = 500
@@ -169,7 +170,7 @@ def _plain(value: Any, of: Callable[[Any], Hashable]) -> Hashable | None:
     kind = type(value)
     if kind in (type(None), bool, int, str):
         return kind, value
-    if kind is float:
+    if kind is float or kind is Unknown:
         return kind, value.hex()
     if kind is np.ndarray and not value.dtype.hasobject:
         return value.shape, value.dtype.str, value.tobytes()

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, flag, number, short, times_each, vector
 from dmoc.basics.quaternions import AXES
+from dmoc.basics.unknown import open_fields
 from dmoc.bodies.torques import OnBody
 from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.engines import Burner
@@ -89,7 +90,7 @@ class Thrusters(OnBody, Burner):
 
     @property
     def adjustable(self) -> tuple[str, ...]:  # type: ignore[override]
-        return ("exhaust_velocity",) if self.burns else ()
+        return (*(("exhaust_velocity",) if self.burns else ()), *open_fields(self))
 
     @property
     def structure(self) -> tuple:
@@ -106,11 +107,11 @@ class Thrusters(OnBody, Burner):
         return tuple(f"thruster_{i + 1}" for i in range(len(self.directions)))
 
     def force(self, u: Any) -> Any:
-        return ca.DM(np.array(self.directions).T) @ u
+        return _columns(self.directions) @ u
 
     def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
-        arms = np.cross(np.array(self.positions), np.array(self.directions))
-        return rotation @ self.force(u), ca.DM(arms.T) @ u
+        places, ways = _columns(self.positions), _columns(self.directions)
+        return rotation @ self.force(u), ca.cross(places, ways) @ u
 
     def throttle(self, u: Any) -> Any:
         return ca.sum1(u)
@@ -163,6 +164,11 @@ class Thrusters(OnBody, Burner):
         law = {"scaled": "the inertia shrinks with the mass", "constant": "the inertia stays"}[self.inertia_law]
         burning = self._burning_words() + (f", {law}" if self.burns else "")
         return f"{len(self.directions)} thrusters fixed to the body, {most}{ways}{burning}"
+
+
+def _columns(rows: Any) -> Any:
+    """Rows of three numbers as the columns of a matrix; of unknown ones the symbols, row after row."""
+    return ca.reshape(rows, AXES, -1) if isinstance(rows, ca.SX) else ca.DM(np.array(rows).T)
 
 
 def _rows(name: str, value: Any, unit: str) -> tuple[tuple[float, ...], ...]:

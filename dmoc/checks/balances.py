@@ -7,8 +7,8 @@ import numpy as np
 
 from dmoc.basics.quaternions import rotated
 from dmoc.checks.evidence import Evidence
+from dmoc.configurations.acting import specific_lagrangian, state_symbols
 from dmoc.configurations.coordinates import ATTITUDE
-from dmoc.motion.dynamics import specific_lagrangian, state_symbols
 from dmoc.motion.march import wrench_of
 from dmoc.motion.momenta import along_path, rates_along
 

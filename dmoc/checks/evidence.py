@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.motion.dynamics import Dynamics, point_function
+from dmoc.configurations.acting import point_function
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import Flown, flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import force_of

@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from dmoc.checks.evidence import Evidence
+from dmoc.configurations.acting import state_symbols
 from dmoc.configurations.coordinates import ATTITUDE
-from dmoc.motion.dynamics import state_symbols
 from dmoc.motion.flown import BREAKS
 from dmoc.motion.momenta import rates_along
 from dmoc.results.between import BOUND, cuts, turn_cuts

@@ -21,6 +21,7 @@ from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
+from dmoc.results.facts import optimality_limit
 from dmoc.results.flown_cost import unpriced
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
@@ -38,8 +39,6 @@ LEDGER = 1e-8
 CONSTRAINT = 1e-10
 # A body may turn by less than this between neighbouring nodes [rad]: beyond it the scheme has other solutions.
 TURN_MOST = np.radians(90)
-# The first-order conditions may be off by this part of the objective or the force [-].
-OPTIMALITY = 1e-5
 
 
 def verify(
@@ -231,7 +230,8 @@ def _optimality(evidence: Evidence) -> Check:
         f"control {left.force:.0e}, costate {left.path:.0e}, limits {left.limits:.0e}, "
         f"objective {left.objective:.0e}"
     )
-    return Check.of("optimality", left.largest, OPTIMALITY, "-", note)
+    limit = optimality_limit(evidence.solution.tolerance)
+    return Check.of("optimality", left.largest, limit, "-", note)
 
 
 def _stability(evidence: Evidence) -> Check:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from dmoc.cli import disperse as disperse_command
+from dmoc.cli import flights as flights_command
 from dmoc.cli import pages as pages_command
 from dmoc.cli import paths as paths_command
 from dmoc.cli import solve as solve_command
@@ -256,8 +256,12 @@ for _verb, _example in (
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
     (
-        disperse_command.disperse,
+        flights_command.disperse,
         "dmoc disperse flight.nc --start 0.01,0.001 --force 0.01 --pointing 0.01 --plot flights.png",
+    ),
+    (
+        flights_command.identify,
+        "dmoc identify free_flyer --unknown mass=10 --unknown drag=1 --unknown offset --noise 0.001",
     ),
     (sweep_command.sweep, "dmoc sweep orbit_raise --vary duration=8:20:25 --out map.nc"),
     (study_command.study, "dmoc study orbit_raise --against scripts/alternatives.py --plot study.png"),

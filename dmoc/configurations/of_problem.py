@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from dmoc.basics.unknown import has_unknown
 from dmoc.configurations.base import Configuration, Translation
 from dmoc.configurations.gyrostat import Gyrostat
 from dmoc.configurations.linked import Linked
 from dmoc.configurations.many import Many
-from dmoc.configurations.rigid import RigidBody
+from dmoc.configurations.rigid import Moments, RigidBody
 
 
 def configuration_of(problem: Any) -> Configuration:
@@ -35,3 +36,9 @@ def free_configuration(problem: Any) -> Configuration:
     constant = actuator.burns and actuator.inertia_law == "constant"
     wheels = actuator.wheel_axes
     return Gyrostat(*of_body, constant, wheels) if wheels else RigidBody(*of_body, constant)
+
+
+def unknown_parts(problem: Any) -> list[Any]:
+    """What moves a body and has unknown numbers: effects, then its inertia."""
+    found: list[Any] = [effect for effect in problem.effects if effect.adjustable]
+    return found + ([Moments(problem.inertia)] if has_unknown(problem.inertia) else [])

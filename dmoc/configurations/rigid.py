@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -14,6 +14,14 @@ from dmoc.basics.quaternions import QUATERNION, columns_of, rotation_of
 from dmoc.configurations.base import AXES, Configuration
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body
+
+
+@dataclass(frozen=True)
+class Moments:
+    """The inertia of a body as a part of a problem whose numbers are unknown."""
+
+    moments: Any
+    adjustable: ClassVar[tuple[str, ...]] = ("moments",)
 
 
 @dataclass(frozen=True)
@@ -61,13 +69,16 @@ class RigidBody(Configuration):
         return len(AXES)
 
     @property
-    def matrix(self) -> np.ndarray:
-        """J [kg m^2], shape (3, 3)."""
-        return np.array(self.moments)
+    def matrix(self) -> Any:
+        """J [kg m^2], shape (3, 3); of an unknown inertia symbols, row after row."""
+        unknown = isinstance(self.moments, ca.SX)
+        return ca.reshape(self.moments, len(AXES), len(AXES)) if unknown else np.array(self.moments)
 
     def _per_mass(self, m: Any) -> Any:
         """J per unit mass [m^2]."""
-        return ca.DM(self.matrix) / (m if self.start_mass is None else self.start_mass)
+        moments = self.matrix
+        moments = ca.DM(moments) if isinstance(moments, np.ndarray) else moments
+        return moments / (m if self.start_mass is None else self.start_mass)
 
     def _split(self, q: Any, v: Any) -> tuple[Any, Any, Any, Any]:
         """Attitude, its slope, velocity in space and rate in body axes w = 2 H' L(q)' v."""

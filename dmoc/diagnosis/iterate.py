@@ -7,8 +7,9 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from dmoc.configurations.acting import state_symbols
 from dmoc.effects.base import Effect
-from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import velocity_along
 from dmoc.motion.path import DiscretePath

@@ -10,7 +10,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number, short, vector
 from dmoc.effects.base import Force, Part
-from dmoc.effects.user_functions import as_column, tried
+from dmoc.effects.user_functions import as_column, is_zero, tried
 
 # Drag computes the speed |w| against the air as sqrt(|w|^2 + SPEED_FLOOR^2) [m/s], which has derivatives of
 # every order at rest too; a micrometre a second changes no force that matters.
@@ -183,7 +183,7 @@ class ExponentialAtmosphere(Atmosphere):
 
     def velocity_at(self, t: Any, q: Any) -> Any:
         drift = 0 if self.wind is None else self.wind.velocity(t, q)
-        if self.rate == 0:
+        if is_zero(self.rate):
             return drift
         return drift + self.rate * ca.vertcat(-q[1], q[0], *([0] if q.numel() == 3 else []))
 

@@ -1,7 +1,8 @@
 """What every effect is: a frozen dataclass with one method, `lagrangian` or `force`.
 
 `t` is the time [s], `q` the position [m], `v` the velocity [m/s] (CasADi columns of the problem's
-dimension) and `m` the mass [kg]. Constants of an effect are baked into the graph.
+dimension) and `m` the mass [kg]. Constants of an effect are baked into the graph, but for an `Unknown`:
+that is a symbol there.
 """
 
 from __future__ import annotations
@@ -13,12 +14,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from dmoc.basics.docstrings import documented, first_line
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties, documented, first_line
+from dmoc.basics.unknown import open_fields
 
 
 class Part(Duties):
-    """Something that can say in one line what it is."""
+    """Something that can say in one line what it is, and some of whose numbers may be unknown."""
+
+    @property
+    def adjustable(self) -> tuple[str, ...]:
+        """Its fields that hold an `Unknown`, which are symbols where formulas are written down."""
+        return open_fields(self)
 
     def words(self) -> str:
         """One line for a person: what the docstring says it is, and its numbers with units."""

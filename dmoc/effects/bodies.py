@@ -66,8 +66,8 @@ class GravityGradient(BodyConservative):
         if self.place is None:
             position = body.position
         else:
-            position = as_column(self.place(t)) if callable(self.place) else ca.DM(self.place)
-        offset = position - ca.DM(self.center)
+            position = as_column(self.place(t)) if callable(self.place) else as_column(self.place)
+        offset = position - as_column(self.center)
         radius = ca.sqrt(ca.dot(offset, offset))
         inertia = body.inertia if isinstance(body.inertia, ca.SX) else ca.DM(np.asarray(body.inertia))
         seen = body.rotation.T @ offset
@@ -102,7 +102,7 @@ class PivotGravity(BodyConservative):
         )
 
     def lagrangian(self, t: Any, body: Body, m: Any) -> Any:
-        return ca.dot(ca.DM(self.acceleration), body.rotation @ ca.DM(self.arm))
+        return ca.dot(as_column(self.acceleration), body.rotation @ as_column(self.arm))
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ class PlateRadiation(BodyForce):
             raise ValueError(f"PlateRadiation: reflectivity must be 0 to 1 [-]; got {self.reflectivity:g}")
 
     def wrench(self, t: Any, body: Body, m: Any) -> tuple[Any, Any]:
-        toward, mirror = body.rotation.T @ ca.DM(self.direction), self.reflectivity
+        toward, mirror = body.rotation.T @ as_column(self.direction), self.reflectivity
 
         def push(facing: Any, normal: Any) -> Any:
             return -self.flux / LIGHT * facing * ((1 - mirror) * toward + 2 * mirror * facing * normal)

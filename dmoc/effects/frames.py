@@ -10,6 +10,7 @@ import casadi as ca
 from dmoc.basics.arguments import Vector, checked, number, vector
 from dmoc.effects.base import Conservative, Effect
 from dmoc.effects.gravity import PointGravity
+from dmoc.effects.user_functions import as_column
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,11 @@ class RotatingFrame(Conservative):
             )
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        if not isinstance(self.rate, float):
-            drift = ca.cross(ca.DM(self.rate), q)
+        rate = as_column(self.rate)
+        if rate.numel() == 3:
+            drift = ca.cross(rate, q)
         else:
-            drift = ca.vertcat(-self.rate * q[1], self.rate * q[0], *([0] if q.numel() == 3 else []))
+            drift = ca.vertcat(-rate * q[1], rate * q[0], *([0] if q.numel() == 3 else []))
         return ca.dot(v, drift) + 0.5 * ca.dot(drift, drift)
 
     def turns_frame(self) -> bool:

@@ -9,6 +9,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
 from dmoc.effects.base import Attractor, Conservative
+from dmoc.effects.user_functions import as_column
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class UniformGravity(Conservative):
         matching_length(self, "acceleration", len(self.acceleration), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        return ca.dot(ca.DM(self.acceleration), q)
+        return ca.dot(as_column(self.acceleration), q)
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class PointGravity(Conservative):
             matching_length(self, "center", given, dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        offset = q if self.center is None else q - ca.DM(self.center[: q.shape[0]])
+        offset = q if self.center is None else q - as_column(self.center[: q.shape[0]])
         # a square root and products, since a power of 3/2 takes longer than all the rest of a step
         return self.mu / ca.sqrt(ca.dot(offset, offset))
 
@@ -146,5 +147,5 @@ class Spring(Conservative):
         matching_length(self, "anchor", len(self.anchor), dimension)
 
     def lagrangian(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        offset = q - ca.DM(self.anchor)
+        offset = q - as_column(self.anchor)
         return -0.5 * self.stiffness / m * ca.dot(offset, offset)

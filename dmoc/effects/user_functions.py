@@ -62,3 +62,8 @@ def as_column(value: Any) -> Any:
     """A column of what a user's function gave: a CasADi matrix, an array or a list."""
     column = value if isinstance(value, (ca.SX, ca.MX, ca.DM)) else ca.vertcat(*np.atleast_1d(value).ravel())
     return ca.vec(column)
+
+
+def is_zero(value: Any) -> bool:
+    """Whether a number is 0; one that is a symbol is not."""
+    return bool(ca.SX(value).is_zero())

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, checked, entries, same_length, vector
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.parts.rows import Row
 
 

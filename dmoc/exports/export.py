@@ -8,7 +8,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ import casadi as ca
 
 from dmoc.basics.arguments import flag, of_kind
 from dmoc.basics.files import as_path, json_object, sealed_object, unsealed_object
+from dmoc.configurations.coordinates import PLACE
 from dmoc.exports.code import write_code, write_mission_code
 from dmoc.exports.manifest import EXPORT_FORMAT, EXPORT_VERSION, about_mission, about_transfer, manifest, plain
 from dmoc.exports.readme import mission_readme, readme
@@ -24,12 +25,14 @@ from dmoc.motion.lobatto import scheme
 from dmoc.planners import functions as export_functions
 from dmoc.planners import planner as export_solver
 from dmoc.planners import residual as export_residual
+from dmoc.planners import sensitive
 from dmoc.planners.mission import MissionPlanner
 from dmoc.planners.planner import Planner
 from dmoc.planners.terms import Exported
 from dmoc.planners.whole import coded, mission_functions
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+from dmoc.sensitivity.exported import prediction
 from dmoc.solver.meshes import DEFAULT_STEPS
 from dmoc.solver.solve import check_numerics
 
@@ -59,6 +62,11 @@ def export(
     whether a plan can be flown; whether it is an optimum, `solver.stats()["return_status"]` says, also after
     loading. Where it fails, `residual` [N] and `violations_...` [-] say: the defect at every node, and each
     bound and row in the shape of its multipliers.
+
+    `worth` gives the derivatives of the objective by all numbers, from a plan and its multipliers as the solver
+    gives them; `covariance`, of a body that does not turn, how errors at the start and of forces spread along a
+    plan; and `predict`, where the guess is an optimal Solution on the same mesh, the plan for other numbers to
+    first order. An `Unknown` of an effect is an argument of them, of the solver and of the cost.
 
     A body that turns has an `attitude` (a unit quaternion from body axes to space axes, scalar first) and a
     `rate` [rad/s] in body axes beside position and velocity; where its attitude is all there is, no argument is
@@ -149,7 +157,7 @@ def _of_transfer(problem: Any, numerics: tuple, options: dict[str, Any] | None, 
     steps = DEFAULT_STEPS[scheme(order).order] if steps is None else steps
     planner = Planner.of(problem, order, steps, hold, guess)
     words, write = readme(planner.scene, c), partial(write_code, planner)
-    return _Contents(functions_of(planner, options), 3, about_transfer(planner), words, write)
+    return _Contents(functions_of(planner, options, guess), 3, about_transfer(planner), words, write)
 
 
 def _of_mission(problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool) -> _Contents:
@@ -160,7 +168,7 @@ def _of_mission(problem: Any, numerics: tuple, options: dict[str, Any] | None, c
     return _Contents(functions, coded(planner), about_mission(planner), mission_readme(planner, c), write)
 
 
-def functions_of(planner: Planner, options: dict[str, Any] | None = None) -> list[Exported]:
+def functions_of(planner: Planner, options: dict[str, Any] | None = None, guess: Any = None) -> list[Exported]:
     """All functions of an export; the first three can become C code."""
     scene = planner.scene
     return [
@@ -172,7 +180,25 @@ def functions_of(planner: Planner, options: dict[str, Any] | None = None) -> lis
         export_solver.solver(planner, options, warm=False),
         export_solver.solver(planner, options, warm=True),
         export_solver.nominal(planner),
+        *_near(planner, guess),
     ]
+
+
+def _near(planner: Planner, guess: Any) -> list[Exported]:
+    """What an answer is worth, how errors spread along it, and at a solution the plan for other numbers."""
+    scene, found = planner.scene, [sensitive.worth(planner)]
+    blocks = scene.dynamics.configuration.coordinates.blocks
+    if len(blocks) == 1 and blocks[0].kind == PLACE and not scene.dynamics.configuration.conditions:
+        found.append(sensitive.covariance(scene))
+    if (
+        getattr(guess, "optimal", False)
+        and guess.problem is not None
+        and guess.path.mesh.size == scene.steps + 1
+    ):
+        with suppress(ValueError):
+            # A degenerate answer does not say how it moves.
+            found.append(prediction(planner, guess))
+    return found
 
 
 def _save(function: ca.Function, file: Path) -> None:

@@ -1,9 +1,11 @@
-"""Coasts: where a body gets without thrust."""
+"""Coasts: where a body gets without thrust, and between two impulses."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,6 +14,9 @@ from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
 from dmoc.effects.base import Conservative
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights
+from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
 
 # A coast is followed at this many places at least; between them it is interpolated linearly.
@@ -23,6 +28,71 @@ MANY_TURNS = 3
 # orbit that changes evenly leads to the same answer sooner. Coarse meshes and the solver's tolerance follow the
 # revolutions, too, whose rounding adds up.
 VERY_MANY_TURNS = 8
+# The half of an ellipse between two orbits is laid so many times through where the coast before it ends.
+PASSES = 3
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """A path of coasts with a change of the velocity between one and the next.
+
+    Attributes
+    ----------
+    times : array, shape (count,)
+        Of the impulses, counted from the start [s].
+    changes : array, shape (count, axes)
+        Of the velocity [m/s].
+    arcs : list
+        Of each coast the times of its ends [s], and its positions and velocities at evenly spaced times.
+    """
+
+    times: np.ndarray
+    changes: np.ndarray
+    arcs: list[tuple[float, float, np.ndarray]]
+
+    def states(self, at: np.ndarray) -> np.ndarray:
+        """Positions [m] and velocities [m/s] at times from the start on [s], shape (count, 2 axes)."""
+        found = np.zeros((len(at), self.arcs[0][2].shape[1]))
+        for begin, finish, states in self.arcs:
+            inside = (at >= begin) & (at <= finish)
+            places = np.linspace(begin, finish, len(states))
+            found[inside] = np.stack([np.interp(at[inside], places, column) for column in states.T], axis=1)
+        return found
+
+
+def two_impulses(problem: TransferProblem, duration: float) -> Impulses | None:
+    """From a known state to an orbit around a lone attractor by half an ellipse (W. Hohmann, 1925).
+
+    Between orbits that are nearly round that takes the least change of velocity. The coasts before and after
+    take as long as each other. None where the ellipse takes longer than there is.
+    """
+    attractor, n = problem.attraction.lone, problem.dimension
+    assert attractor is not None
+    center, start, goal = attractor.place(n), problem.start.fixed(), problem.start_time + duration
+    leave, radius = 0.5 * duration, 0.0
+    before: Any = None
+    for _ in range(PASSES):
+        if leave <= 0 or (before := coast(problem, 0.0, leave, start)) is None:
+            return None
+        q, v = before[-1, :n] - center, before[-1, n:]
+        distance = float(np.linalg.norm(q))
+        # A velocity across the position, along the motion, and its opposite half a revolution later.
+        along = v - q * (v @ q) / distance**2
+        along /= np.linalg.norm(along) or 1.0
+        aside = center - q * ((radius or distance) / distance)
+        place, wanted = problem.goal.estimate(goal, (aside, -along * np.linalg.norm(v)))
+        radius = float(np.linalg.norm(place - center))
+        half = 0.5 * (distance + radius)
+        there, arriving = (np.sqrt(attractor.mu * (2 / r - 1 / half)) for r in (distance, radius))
+        taken = np.pi * np.sqrt(half**3 / attractor.mu)
+        leave = 0.5 * (duration - taken)
+    on_the_way = coast(problem, leave, leave + taken, (q + center, there * along))
+    after = coast(problem, leave + taken, duration, (place, wanted))
+    if leave <= 0 or on_the_way is None or after is None:
+        return None
+    changes = np.stack([there * along - v, wanted + arriving * along])
+    arcs = [(0.0, leave, before), (leave, leave + taken, on_the_way), (leave + taken, duration, after)]
+    return Impulses(np.array([leave, leave + taken]), changes, arcs)
 
 
 def coast(
@@ -70,3 +140,28 @@ def _march(dynamics: Dynamics, centers: tuple, samples: int) -> ca.Function:
     # can have.
     motion = {"t": fraction, "x": state, "p": given, "ode": rate}
     return adams(motion, np.linspace(0.0, 1.0, samples), tol=1e-10, most_steps=1000)
+
+
+def controls_for(problem: TransferProblem, force: np.ndarray) -> np.ndarray | None:
+    """The controls with which the actuator gives a force of shape (count, axes) [N].
+
+    None unless the controls are the force, or the force and its magnitude.
+    """
+    n = problem.dimension
+    more = problem.actuator.labels(n)[n:]
+    if problem.controls < n or more not in ((), ("throttle",)):
+        return None
+    return np.hstack([force, np.linalg.norm(force, axis=1, keepdims=True)]) if more else force
+
+
+def with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
+    """The path with the mass that its controls leave, at least half of it."""
+    if not problem.actuator.burns:
+        return path
+    u = ca.SX.sym("u", problem.controls)
+    flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
+    weights = node_weights(path.mesh, scheme(path.order))
+    if path.hold:
+        flow = np.interp(path.fractions, 0.5 * (path.mesh[1:] + path.mesh[:-1]), flow)
+    burnt = path.duration * np.cumsum(weights * flow)
+    return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))

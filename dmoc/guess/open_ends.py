@@ -11,9 +11,12 @@ import numpy as np
 from dmoc.basics.numerics import cross
 from dmoc.effects.base import Attractor
 from dmoc.ends.base import Boundary
-from dmoc.guess.coast import coast
+from dmoc.guess.coast import coast, controls_for, two_impulses, with_mass
 from dmoc.guess.spiral import MOST_BENT, Spiral
 from dmoc.guess.winding import Winding
+from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
 
@@ -28,6 +31,14 @@ NEARLY_ROUND = 0.3
 # An orbit is not changed evenly into another if the cosine of the angle between their angular momenta is below
 # this [-]: their bodies turn in nearly opposite senses.
 OPPOSITE = -0.9
+# A burn is short if it takes less than this part of the time between the two [-]: a longer one is far from an
+# impulse.
+SHORT_BURN = 0.7
+# A path of two burns is a good start if it takes no more than this many times the velocity change of an even
+# change of the orbit [-]: one that turns the plane, or that is not round, takes more.
+NO_DEARER = 1.1
+# A goal that moves is looked at at this many times.
+SAMPLES = 200
 # So many revolutions more are tried where another number of them may be better.
 OTHER_TURNS = (1, -1, 2, -2)
 
@@ -124,6 +135,36 @@ def with_more_turns(problem: TransferProblem, base: DiscretePath, turns: int) ->
     return replace(base, position=windings[0][0](base.fractions) if windings else turned)
 
 
+def two_burns(problem: TransferProblem, first: DiscretePath) -> DiscretePath | None:
+    """A path of two burns of full thrust on the mesh of another one; None where they would be long or dear."""
+    limit, duration = problem.actuator.force_limit() or 0.0, first.duration
+    if problem.size > problem.dimension or np.isnan(problem.start.fixed()).any() or problem.goal.anchored:
+        return None
+    found = two_impulses(problem, duration)
+    if found is None:
+        return None
+    sizes = np.linalg.norm(found.changes, axis=1)
+    lengths, between = problem.mass * sizes / limit, np.diff(found.times)[0]
+    even = velocity_change_between(problem, end_estimates(problem, duration))
+    if not 0 < lengths.min() < lengths.max() < SHORT_BURN * between or sizes.sum() > NO_DEARER * even:
+        return None
+    begins, ends = found.times - 0.5 * lengths, found.times + 0.5 * lengths
+    if begins[0] < 0:
+        return None
+    weights = np.diff(first.mesh) if first.hold else node_weights(first.mesh, scheme(first.order))
+    edges = duration * np.append(0.0, np.cumsum(weights))
+    # Each control has the part of its share of the time in which there is thrust.
+    covered = np.minimum(edges[1:, None], ends) - np.maximum(edges[:-1, None], begins)
+    force = (np.maximum(covered, 0.0) / np.diff(edges)[:, None] * limit / sizes) @ found.changes
+    states = found.states(duration * first.fractions)
+    control = controls_for(problem, force)
+    if control is None:
+        return None
+    position, velocity = np.hsplit(states, 2)
+    path = replace(first, start_velocity=velocity[0], goal_velocity=velocity[-1])
+    return with_mass(problem, replace(path, position=position, control=control))
+
+
 def change_without_phase(problem: TransferProblem, states: Any) -> float | None:
     """The velocity change of an even change of one orbit into another, whatever the phase [m/s].
 
@@ -131,6 +172,29 @@ def change_without_phase(problem: TransferProblem, states: Any) -> float | None:
     """
     winding = _winding(problem, problem.duration_bounds[0], states)
     return None if winding is None else winding.velocity_change
+
+
+def swings(problem: TransferProblem) -> float:
+    """Swings a second of the motion, or of a goal that moves [1/s]; 0 where nothing does.
+
+    In a frame that turns, on a spring or to a goal that goes to and fro each swing may hold an optimum: one
+    that was found at once cost 48 times as much as the best.
+    """
+    ends, begin = (problem.start, problem.goal), problem.start_time
+    point = problem.inertia is None and not problem.links and problem.system is None
+    if not point or problem.attraction.sources or not all(end.anchored for end in ends):
+        return 0.0
+    shortest, longest = problem.duration_bounds
+    q, v = (np.nan_to_num(part) for part in problem.start.estimate(begin))
+    matrix = np.array(Dynamics.of(problem).linearised[0](begin, q, v, problem.mass))
+    modes = np.linalg.eigvals(matrix) if np.isfinite(matrix).all() else np.zeros(1)
+    rate = float(np.abs(modes.imag).max()) / (2 * np.pi)
+    if problem.goal.moves:
+        at = np.linspace(begin + shortest, begin + longest, SAMPLES)
+        ways = np.diff([problem.goal.estimate(time)[0] for time in at], axis=0)
+        turned = (ways[1:] * ways[:-1] < 0).sum(axis=0).max()
+        rate = max(rate, 0.5 * turned / (longest - shortest))
+    return rate
 
 
 def _from_center(problem: TransferProblem, attractor: Attractor, states: Any) -> list[tuple]:

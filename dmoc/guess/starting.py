@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import LARGEST, short
 from dmoc.guess.around import path_around, shortest_flyable
-from dmoc.guess.coast import VERY_MANY_TURNS
+from dmoc.guess.coast import VERY_MANY_TURNS, controls_for
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.open_ends import end_estimates, spiral_between
@@ -185,18 +185,6 @@ def _force_along(problem: TransferProblem, guess: DiscretePath) -> np.ndarray:
     control = controls_for(problem, force)
     assert control is not None
     return control if limit is None else control * min(1.0, limit / (thrust.max() or limit))
-
-
-def controls_for(problem: TransferProblem, force: np.ndarray) -> np.ndarray | None:
-    """The controls with which the actuator gives a force of shape (count, axes) [N].
-
-    None unless the controls are the force, or the force and its magnitude.
-    """
-    n = problem.dimension
-    more = problem.actuator.labels(n)[n:]
-    if problem.controls < n or more not in ((), ("throttle",)):
-        return None
-    return np.hstack([force, np.linalg.norm(force, axis=1, keepdims=True)]) if more else force
 
 
 def guess_duration(problem: TransferProblem) -> float:

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, short, whole
-from dmoc.basics.duties import Named
+from dmoc.basics.docstrings import Named
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Event
 from dmoc.parts.forces import Unpowered

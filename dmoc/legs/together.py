@@ -13,7 +13,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, flag, number, short
 from dmoc.basics.digits import down
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import KeepOut
 from dmoc.parts.rows import Row

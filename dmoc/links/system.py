@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
-from dmoc.basics.duties import Named
+from dmoc.basics.docstrings import Named
 from dmoc.configurations.rigid import checked_inertia
 from dmoc.links.holonomic import Holonomic
 

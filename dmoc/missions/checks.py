@@ -14,10 +14,11 @@ from dmoc.chains.program import MissionProgram
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.optimality import idle, left_over
 from dmoc.checks.primer import primer_check
-from dmoc.checks.verification import CHECKS, OPTIMALITY, Check, Report, not_finite, own_checks, refuse_twins
+from dmoc.checks.verification import CHECKS, Check, Report, not_finite, own_checks, refuse_twins
 from dmoc.checks.worst import fastest, worst_of
 from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.missions.solution import MissionSolution
+from dmoc.results.facts import optimality_limit
 
 # States at joints may be off by this part of the units of a leg [-]: Ipopt meets rows to a tolerance.
 JOINED = 1e-8
@@ -124,4 +125,4 @@ class Whole:
         sense = self.solution.require_problem().objective.sense
         stated = abs(self.cost - sense * self.solution.objective) / program.cost
         note = f"control {force:.0e}, costate {path:.0e}, limits {limits:.0e}, objective {stated:.0e}"
-        return Check.of("optimality", max(force, path, limits, stated), OPTIMALITY, "-", note)
+        return Check.of("optimality", max(force, path, limits, stated), optimality_limit(None), "-", note)

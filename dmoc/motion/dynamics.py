@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.memory import remembered_property
+from dmoc.configurations.acting import (
+    kinetic_at_nodes,
+    point_function,
+    specific_lagrangian,
+    split_effects,
+    state_symbols,
+    symbols_in,
+)
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.configurations.rigid import newton_euler
@@ -44,6 +52,21 @@ class Dynamics:
     def controls(self) -> int:
         """Number of controls at a node."""
         return self.actuator.size(self.configuration.dimension)
+
+    @cached_property
+    def unknowns(self) -> list[ca.SX]:
+        """Symbols of unknown numbers in it: with them its functions serve as parts of formulas alone."""
+        moments = getattr(self.configuration, "moments", None)
+        return [
+            *symbols_in(self.effects),
+            *symbols_in((moments,)),
+            *symbols_in(tuple(vars(self.actuator).values())),
+        ]
+
+    @property
+    def loose(self) -> dict[str, bool]:
+        """Options of its functions: those with unknown numbers have symbols that are no arguments."""
+        return {"allow_free": bool(self.unknowns)}
 
     def symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         """Symbols t, q, v, m."""
@@ -84,7 +107,7 @@ class Dynamics:
         """(t, q, w, m) -> p = Z' dl/dv: momentum [m/s] and spin in body axes [m^2/s], per unit mass."""
         t, q, w, m, v = self.states()
         along = self.configuration.along(q, self.point(t, q, v, m)[1])
-        return ca.Function("momentum", [t, q, w, m], [along])
+        return ca.Function("momentum", [t, q, w, m], [along], self.loose)
 
     @remembered_property
     def velocity(self) -> ca.Function:
@@ -105,7 +128,7 @@ class Dynamics:
         at_rest = self.momentum(t, q, ca.DM.zeros(self.freedom), m)
         free = ca.solve(inertia, p - at_rest)
         if not self.configuration.joined:
-            return ca.Function("velocity", [t, q, p, m], [free])
+            return ca.Function("velocity", [t, q, p, m], [free], self.loose)
         bars = self.configuration.bars(q)
         return ca.Function("velocity", [t, q, p, m], [free - _taken(inertia, bars, bars @ free)])
 
@@ -221,79 +244,11 @@ class Dynamics:
         """(q, u) -> force in space axes [N]; of a rigid body torques on wheels and in body axes, too [N m]."""
         q, u = ca.SX.sym("q", self.positions), ca.SX.sym("u", self.controls)
         body = self.configuration
-        return ca.Function("wrench", [q, u], [ca.densify(body.along(q, self.actuator.acts(body, q, u)))])
+        acts = ca.densify(body.along(q, self.actuator.acts(body, q, u)))
+        return ca.Function("wrench", [q, u], [acts], self.loose)
 
 
 def _taken(inertia: Any, bars: Any, opening: Any) -> Any:
     """What reactions of links take of a velocity that would open them: M^-1 C' (C M^-1 C')^-1 opening."""
     back = ca.solve(inertia, bars.T)
     return back @ ca.solve(bars @ back, opening)
-
-
-def kinetic_at_nodes(configuration: Configuration, degree: int) -> bool:
-    """Whether the kinetic energy of a step is taken from its nodes; else it is `step_inertia`."""
-    return not (configuration.surplus and degree == 1)
-
-
-def state_symbols(positions: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Symbols t, q, v, m."""
-    return ca.SX.sym("t"), ca.SX.sym("q", positions), ca.SX.sym("v", positions), ca.SX.sym("m")
-
-
-def specific_lagrangian(effects: Sequence[Effect], configuration: Configuration, t, q, v, m) -> Any:
-    """Sum of the conservative effects' Lagrangians per unit mass, without the kinetic energy [J/kg]."""
-    total = ca.SX(0)
-    for _, body, mass in configuration.members(q, v, m):
-        terms = [effect.lagrangian_of(t, body, mass) for effect in effects]
-        mine = sum((term for term in terms if term is not None), ca.SX(0))
-        total = total + (mine if mass is m else mass / m * mine)
-    for effect in effects:
-        if effect.joins and (energy := effect.energy_between(t, configuration.at(q, v, m))) is not None:
-            total = total - energy / m
-    return total
-
-
-def point_function(
-    effects: Sequence[Effect], configuration: Configuration, kinetic: bool = True
-) -> ca.Function:
-    """(t, q, v, m) -> dl/dq, dl/dv, F/m of these effects, with or without the kinetic energy."""
-    t, q, v, m = state_symbols(configuration.size)
-    lagrangian = specific_lagrangian(effects, configuration, t, q, v, m)
-    push = ca.SX.zeros(configuration.size)
-    for effect in effects:
-        for name, body, mass in configuration.members(q, v, m):
-            force, torque = effect.wrench_of(t, body, mass)
-            if force is not None or torque is not None:
-                push = push + configuration.on(name, q, force, torque) / m
-        if effect.joins:
-            acts = effect.acts_between(configuration, t, q, configuration.at(q, v, m))
-            push = push if acts is None else push + acts / m
-    moved, inertia = configuration.inertia(q, v, m) if kinetic else (0, 0)
-    change = configuration.shared(ca.gradient(lagrangian, q), m) + moved, ca.gradient(lagrangian, v) + inertia
-    return ca.Function("point", [t, q, v, m], [*change, configuration.shared(push, m)])
-
-
-def split_effects(
-    effects: Sequence[Effect], configuration: Configuration
-) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    """Effects that look only at t, q, m, and those that look at the velocity.
-
-    The first are evaluated once a node. The second are evaluated in each of the two steps that share a
-    node, since each step has a velocity of its own there.
-    """
-    t, q, v, m = state_symbols(configuration.size)
-    members = configuration.members(q, v, m)
-
-    def looks_at_velocity(effect: Effect) -> bool:
-        acts = [
-            act
-            for _, body, mass in members
-            for act in (effect.lagrangian_of(t, body, mass), *effect.wrench_of(t, body, mass))
-        ]
-        if effect.joins:
-            at = configuration.at(q, v, m)
-            acts += [effect.energy_between(t, at), effect.acts_between(configuration, t, q, at)]
-        return any(ca.depends_on(ca.SX(act), v) for act in acts if act is not None)
-
-    known = [(looks_at_velocity(effect), effect) for effect in effects]
-    return tuple(e for moving, e in known if not moving), tuple(e for moving, e in known if moving)

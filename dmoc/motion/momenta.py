@@ -219,7 +219,7 @@ def _legendre_function(dynamics: Dynamics, order: int, hold: bool) -> ca.Functio
         return moving(t, r + origin, v, m)
 
     momenta = step_momenta(rule, point, t, h, nodes, ca.vertsplit(m), push, body, origin)
-    return ca.Function("legendre", [q, m, u, t, h, origin], momenta)
+    return ca.Function("legendre", [q, m, u, t, h, origin], momenta, dynamics.loose)
 
 
 def flow_between_links(

@@ -31,8 +31,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.configurations.acting import kinetic_at_nodes
 from dmoc.configurations.base import Configuration
-from dmoc.motion.dynamics import Dynamics, kinetic_at_nodes
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 
 
@@ -119,8 +120,9 @@ def _step_map(dynamics: Dynamics, scheme: Scheme, hold: bool) -> ca.Function:
     t, h, masses = ca.SX.sym("t"), ca.SX.sym("h"), ca.SX.sym("m", s + 1)
     # Without a control the columns of none are not told apart when steps are mapped, so there are none.
     u = ca.SX.sym("u", dynamics.controls, (1 if hold else s + 1) * (dynamics.controls > 0))
-    given = [q, p, masses, u, t, h, origin]
-    names = ["q", "p", "m", "u", "t", "h", "origin"]
+    # Unknown numbers are further inputs, behind all others.
+    given = [q, p, masses, u, t, h, origin, *dynamics.unknowns]
+    names = ["q", "p", "m", "u", "t", "h", "origin", *[f"c{i}" for i in range(len(dynamics.unknowns))]]
     m = ca.vertsplit(masses)
 
     def point(t, r, v, m):

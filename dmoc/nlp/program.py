@@ -21,7 +21,7 @@ from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.units import Units
-from dmoc.parts.rows import values_of
+from dmoc.parts.rows import alike, values_of
 from dmoc.scene.problem import TransferProblem
 
 
@@ -50,13 +50,13 @@ class Program:
         """Raise ValueError, by name, if the problem differs in more than states, mass, limits, times."""
         old = self.problem
 
-        def each(alike: Callable, new: Sequence, known: Sequence) -> bool:
-            return len(new) == len(known) and all(map(alike, new, known))
+        def each(same: Callable, new: Sequence, known: Sequence) -> bool:
+            return len(new) == len(known) and all(map(same, new, known))
 
         same = {
             "dimension": problem.dimension == old.dimension,
             "inertia or links": configuration_of(problem) == self.dynamics.configuration,
-            "effects": each(_equal, problem.effects, old.effects),
+            "effects": each(alike, problem.effects, old.effects),
             "actuator": _built_alike(problem.actuator, old.actuator),
             "objective": _equal(problem.objective, old.objective),
             "constraints": each(_built_alike, problem.constraints, old.constraints),

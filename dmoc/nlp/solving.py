@@ -160,12 +160,12 @@ class NLP(Program):
         **found: Any,
     ) -> Solution:
         """An answer as a Solution; `found` are further fields of it."""
-        path = self.path(problem, answer)
-        momentum, velocity = end_momenta(self.dynamics, path, problem.start_time)
+        path, dynamics = self.path(problem, answer), replace(self.dynamics, effects=tuple(problem.effects))
+        momentum, velocity = end_momenta(dynamics, path, problem.start_time)
         return Solution(
             problem=problem,
             path=path,
-            **reported(path, velocity, momentum, force_of(self.dynamics, path)),
+            **reported(path, velocity, momentum, force_of(dynamics, path)),
             objective=self.objective(answer.objective),
             success=answer.status == "solved",
             status=answer.status,

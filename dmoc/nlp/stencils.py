@@ -15,8 +15,10 @@ from typing import Any
 import casadi as ca
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.unknown import with_field
+from dmoc.configurations.acting import point_function, split_effects
 from dmoc.configurations.of_problem import configuration_of
-from dmoc.motion.dynamics import Dynamics, point_function, split_effects
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
@@ -49,18 +51,17 @@ def stencils_of(
 
 
 def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool) -> Stencils:
-    writer = _Writer(problem, rule, hold, curved, joined)
+    writer = Writer(problem, rule, hold, curved, joined)
     return Stencils((writer.node(), writer.step(), writer.ends()), writer.parameters.numel())
 
 
-class _Writer:
+class Writer:
     """A problem's formulas while they are being written down: its parts with symbols as their numbers."""
 
     def __init__(self, problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool):
         self.problem, self.rule, self.hold, self.curved = problem, rule, hold, curved
         self.joined = joined
-        self.dynamics = Dynamics.of(problem)
-        self.origin, self.start_time = ca.SX.sym("origin", self.dynamics.positions), ca.SX.sym("start_time")
+        self.origin, self.start_time = ca.SX.sym("origin", problem.size), ca.SX.sym("start_time")
         self.mass = ca.SX.sym("mass")
         head = [self.origin, self.start_time, self.mass]
         if not problem.free_duration:
@@ -68,7 +69,13 @@ class _Writer:
             head.append(self.duration)
         twins = [with_symbols(part, f"part_{i}") for i, part in enumerate(problem.adjustable_parts)]
         self.parameters = ca.vertcat(*head, *[symbol for _, symbols in twins for symbol in symbols])
-        self.actuator, self.objective, self.start, self.goal, *self.constraints = [twin for twin, _ in twins]
+        self.actuator, self.objective, self.start, self.goal, *others = [twin for twin, _ in twins]
+        self.constraints, unknown = others[: len(problem.constraints)], iter(others[len(problem.constraints) :])
+        self.effects = tuple(next(unknown) if one.adjustable else one for one in problem.effects)
+        # After the effects comes an unknown inertia.
+        for part in unknown:
+            problem = with_field(problem, "inertia", part.moments)
+        self.dynamics = Dynamics.of(problem, self.effects)
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
@@ -79,7 +86,7 @@ class _Writer:
         fraction, weight = draft.number("fraction"), draft.number("weight")
         t, q = draft.clock() + fraction * duration, r + self.origin
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
-        resting, _ = split_effects(self.problem.effects, body)
+        resting, _ = split_effects(self.effects, body)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
         push = push if u is None else push + body.driven(self.actuator, q, u, m)
         if body.conditions:
@@ -119,7 +126,7 @@ class _Writer:
             body.driven(self.actuator, place + self.origin, u[0], mass) if self.hold else 0
             for place, mass in zip(r, m, strict=True)
         ]
-        moving = self.dynamics.step_point(rule.degree, split_effects(problem.effects, body)[1])
+        moving = self.dynamics.step_point(rule.degree, split_effects(self.effects, body)[1])
         t0 = draft.clock() + begin * duration
 
         def point(t, r, v, m):

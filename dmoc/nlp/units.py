@@ -75,9 +75,9 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     torque = _torque(problem, guess, force * length)
     sizes = np.where(forces, force, torque)
     cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, sizes)))
-    # All nozzles at once make no force, one of them does.
-    alone = sizes * (np.arange(len(sizes)) == 0)
-    cost = cost or abs(cost_along(problem, guess, alone)) or 1.0
+    # All nozzles at once make no force, or next to none by rounding; one of them does.
+    alone = abs(cost_along(problem, guess, sizes * (np.arange(len(sizes)) == 0)))
+    cost = (cost if cost > LEAST_SHARE * alone else alone) or 1.0
     return Units(length, time, force, problem.mass, cost, torque, origin)
 
 

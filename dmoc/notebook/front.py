@@ -42,3 +42,12 @@ def table(solution: Any) -> Any:
     from dmoc.notebook.table import node_table
 
     return node_table(solution)
+
+
+def estimate(found: Any, path: str | os.PathLike | None = None) -> Any:
+    """`Estimate.plot`."""
+    from dmoc.charts.identification import estimate_figure
+    from dmoc.charts.study import save_page
+
+    page = estimate_figure(found)
+    return page if path is None else save_page(page, path)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, of_kind, vector
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.basics.quaternions import AXES, QUATERNION, rotated
 from dmoc.effects.base import Body
 from dmoc.parts.outline import Shape

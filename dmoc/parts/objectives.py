@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
-from dmoc.basics.duties import Duties
+from dmoc.basics.docstrings import Duties
 from dmoc.parts.actuator import Actuator
 
 

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.unknown import at, with_field
+
 
 class Row(NamedTuple):
     """lower <= expression <= upper: dimensionless and of a size near 1, or in `unit`, "m" or "m/s"."""
@@ -34,11 +36,18 @@ def with_symbols(part: Any, name: str) -> tuple[Any, list]:
     """A twin of a part whose adjustable fields are CasADi symbols, and those symbols."""
     twin, symbols = copy.copy(part), []
     for field, value in zip(part.adjustable, _values(part), strict=True):
-        # The twin is frozen, and its constructor would refuse a symbol: the field is set past both.
-        symbol = ca.SX.sym(f"{name}.{field}", value.size)
-        object.__setattr__(twin, field, symbol)
-        symbols.append(symbol)
+        symbols.append(ca.SX.sym(f"{name}.{field}", value.size))
+        twin = with_field(twin, field, symbols[-1])
     return twin, symbols
+
+
+def alike(new: Any, old: Any) -> bool:
+    """Whether two parts are equal but for the numbers in their adjustable fields."""
+    if type(new) is not type(old) or new.adjustable != old.adjustable:
+        return False
+    for field in new.adjustable:
+        new, old = with_field(new, field, None), with_field(old, field, None)
+    return vars(new) == vars(old)
 
 
 def values_of(part: Any) -> np.ndarray:
@@ -47,4 +56,4 @@ def values_of(part: Any) -> np.ndarray:
 
 
 def _values(part: Any) -> list[np.ndarray]:
-    return [np.atleast_1d(np.asarray(getattr(part, field), float)) for field in part.adjustable]
+    return [np.ravel(np.asarray(at(part, field), float)) for field in part.adjustable]

@@ -19,7 +19,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map
 from dmoc.parts.rows import with_symbols
-from dmoc.planners.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms
+from dmoc.planners.terms import PARTS, TERMS, Exported, Part, Term, named, number_terms, opened_effects
 from dmoc.scene.problem import TransferProblem
 
 
@@ -38,7 +38,27 @@ class Scene:
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        return Dynamics.of(self.problem)
+        """With symbols for the unknown constants of effects."""
+        return Dynamics.of(self.problem, self._opened[0])
+
+    @cached_property
+    def _opened(self) -> tuple[tuple, dict[str, int], dict[str, Term]]:
+        return opened_effects(self.problem.effects)
+
+    @property
+    def constants(self) -> dict[str, int]:
+        """What unknown constants of effects are called, and their sizes: they are arguments."""
+        return self._opened[1]
+
+    def closed(self, function: ca.Function) -> ca.Function:
+        """A function of the dynamics with the unknown constants as further arguments."""
+        if not self.constants:
+            return function
+        given = function.sx_in()
+        return ca.Function(function.name(), [*given, *self.dynamics.unknowns], function.call(given))
+
+    def constants_in(self, given: Mapping[str, ca.MX]) -> list[ca.MX]:
+        return [given[name] for name in self.constants]
 
     @property
     def axes(self) -> int:
@@ -82,10 +102,11 @@ class Scene:
     @cached_property
     def terms(self) -> dict[str, Term]:
         """What arguments of this scene mean where it is not what they mean in all."""
+        own = dict(self._opened[2])
         if not self.held:
-            return {}
+            return own
         units = dict.fromkeys(self.problem.actuator.units(self.axes))
-        found = {"forces": Term(", ".join(units), TERMS["forces"].words)}
+        found = own | {"forces": Term(", ".join(units), TERMS["forces"].words)}
         gaps = dict.fromkeys(unit for link in self.dynamics.configuration.link_units for unit in link)
         gap = ", ".join(gaps)
         exerted = ", ".join(dict.fromkeys(self.dynamics.configuration.reaction_units))
@@ -124,7 +145,7 @@ class Scene:
         shapes |= {path: (size, self.steps + 1) for path, size in self.names("speeds").items()}
         states = self.names("place") | self.names("speed")
         states |= self.names("speed", "start_") | self.names("speed", "goal_")
-        return shapes.get(name) or (states.get(name, 1), 1)
+        return shapes.get(name) or ((states | self.constants).get(name, 1), 1)
 
     def symbols(self, *names: str) -> dict[str, ca.MX]:
         return {name: ca.MX.sym(name, *self.shape(name)) for name in names}
@@ -163,11 +184,11 @@ class Scene:
         s = self.rule.degree
         return [values[:, j : j + s * (self.steps - 1) + 1 : s] for j in range(s + 1)]
 
-    def momentum(self, time: Any, position: Any, velocity: Any, mass: Any) -> Any:
+    def momentum(self, time: Any, position: Any, velocity: Any, mass: Any, constants: list) -> Any:
         """dl/dv [m/s]; of a body that turns Z' dl/dv, whose last entries are its spin [m^2/s]."""
         if self.turns:
-            return self.dynamics.momentum(time, position, velocity, mass)
-        return self.dynamics.point(time, position, velocity, mass)[1]
+            return self.closed(self.dynamics.momentum)(time, position, velocity, mass, *constants)
+        return self.closed(self.dynamics.point)(time, position, velocity, mass, *constants)[1]
 
 
 def rows_of(columns: ca.MX, sizes: Mapping[str, int]) -> dict[str, ca.MX]:
@@ -188,22 +209,24 @@ def march(scene: Scene) -> ca.Function:
     n, rule, columns = scene.dynamics.positions, scene.rule, scene.step_columns
     p_end = n + scene.dynamics.freedom
     state, stacked = ca.MX.sym("state", p_end + 2), ca.MX.sym("u", scene.controls * columns)
-    lengths = np.cumsum([0, 1, 1, n, *(value.numel() for value in scene.flow_numbers().values())])
+    flows = [value.numel() for value in scene.flow_numbers().values()]
+    lengths = np.cumsum([0, 1, 1, n, *flows, *scene.constants.values()])
     same = ca.MX.sym("same", int(lengths[-1]))
     start_time, h, origin, *numbers = ca.vertsplit(same, lengths.tolist())
+    numbers, constants = numbers[: len(flows)], numbers[len(flows) :]
     r, p, mass, count = ca.vertsplit(state, [0, n, p_end, p_end + 1, p_end + 2])
     u = ca.reshape(stacked, scene.controls, columns)
     masses = ca.repmat(mass, rule.degree + 1)
     if scene.burns:
-        flows = [scene.flow(u[:, j if columns > 1 else 0], *numbers) for j in range(rule.degree + 1)]
-        masses = masses - h * (ca.DM(rule.integral) @ ca.vertcat(*flows))
+        burnt = [scene.flow(u[:, j if columns > 1 else 0], *numbers) for j in range(rule.degree + 1)]
+        masses = masses - h * (ca.DM(rule.integral) @ ca.vertcat(*burnt))
     t = start_time + count * h
-    dq, dp, v = step_map(scene.dynamics, rule, scene.hold)(r, p, masses, u, t, h, origin)
+    dq, dp, v = step_map(scene.dynamics, rule, scene.hold)(r, p, masses, u, t, h, origin, *constants)
     # positions at the inner nodes: the position in a step is a polynomial of degree s, whose slope is known at
     # all s + 1 nodes, so that integrating the slope gives it exactly
     inner = [r + h * (v @ ca.DM(row)) for row in rule.integral[1:-1]]
     end = ca.vertcat(r + dq, p + dp, masses[-1], count + 1)
-    velocity = scene.dynamics.velocity(t + h, origin + r + dq, p + dp, masses[-1])
+    velocity = scene.closed(scene.dynamics.velocity)(t + h, origin + r + dq, p + dp, masses[-1], *constants)
     function = ca.Function(
         "march", [state, stacked, same], [end, ca.horzcat(*inner, r + dq), masses[1:].T, velocity]
     )
@@ -226,11 +249,12 @@ def one_step(scene: Scene, name: str = "step") -> Exported:
     given = scene.symbols(*scene.names("place"), *scene.names("speed"), "mass", "time", "time_step")
     given["forces"] = ca.MX.sym("forces", scene.controls, scene.step_columns)
     numbers = scene.flow_numbers()
-    given |= numbers
+    given |= numbers | scene.symbols(*scene.constants)
     q, v = scene.joined(given, "place"), scene.joined(given, "speed")
     m, t, h = given["mass"], given["time"], given["time_step"]
-    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), scene.momentum(t, q, v, m), m, 0)
-    same = ca.vertcat(t, h, q, *numbers.values())
+    momentum = scene.momentum(t, q, v, m, scene.constants_in(given))
+    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), momentum, m, 0)
+    same = ca.vertcat(t, h, q, *numbers.values(), *scene.constants_in(given))
     end, _, _, velocity = march(scene)(state, ca.vec(given["forces"]), same)
     outputs = scene.parted(q + end[: scene.dynamics.positions], "place", "next_")
     outputs |= scene.parted(velocity, "speed", "next_")
@@ -247,11 +271,12 @@ def all_steps(scene: Scene, name: str = "rollout") -> Exported:
     state_names = *scene.names("place"), *scene.names("speed")
     given = scene.symbols(*state_names, "mass", "start_time", "duration", "forces")
     numbers = scene.flow_numbers()
-    given |= numbers
+    given |= numbers | scene.symbols(*scene.constants)
     q, v = scene.joined(given, "place"), scene.joined(given, "speed")
     m, t = given["mass"], given["start_time"]
-    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), scene.momentum(t, q, v, m), m, 0)
-    forces, same = scene.split(given["forces"]), ca.vertcat(q, *numbers.values())
+    momentum = scene.momentum(t, q, v, m, scene.constants_in(given))
+    state = ca.vertcat(ca.MX.zeros(scene.dynamics.positions), momentum, m, 0)
+    forces, same = scene.split(given["forces"]), ca.vertcat(q, *numbers.values(), *scene.constants_in(given))
     if scene.mesh:
         ends = ca.DM(scene.mesh).T
         times = ca.vertcat(t + given["duration"] * ends[:-1], given["duration"] * ca.diff(ends, 1, 1))

@@ -236,6 +236,7 @@ def _stretch(twin: Mission, index: int) -> TransferProblem:
         "duration": twin.duration_of(leg),
         "actuator": twin.actuator if leg.actuator is None else leg.actuator,
         "constraints": twin.constraints if leg.constraints is None else leg.constraints,
+        "effects": twin.effects if leg.effects is None else leg.effects,
     }
     for field, value in values.items():
         object.__setattr__(stretch, field, value)

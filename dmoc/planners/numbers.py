@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
@@ -12,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.docstrings import documented
+from dmoc.basics.unknown import Unknown, at, is_number, is_unknown, with_field
 from dmoc.ends.base import Boundary
 from dmoc.nlp.solving import NLP
 from dmoc.parts.rows import title
@@ -148,8 +148,8 @@ def _all_changed(team: Any, changed: Callable[[np.ndarray], Any], values: np.nda
     times = {name: getattr(changed(values), name) for name in ("start_time", "duration")}
     members = team.members
     for name, value in times.items():
-        members = tuple(_with(member, name, value) for member in members)
-    return _with(team, "members", members)
+        members = tuple(with_field(member, name, value) for member in members)
+    return with_field(team, "members", members)
 
 
 def _one_changed(team: Any, place: int, changed: Callable[[np.ndarray], Any], values: np.ndarray) -> Any:
@@ -188,15 +188,19 @@ def _numbers_of_parts(whole: Any, owners: Sequence[str], prefix: str, put: Calla
     """The numbers of some parts of a problem, a mission or a leg, and of its constraints."""
 
     def changed(field: str, value: Any) -> Any:
-        return put(_with(whole, field, value))
+        return put(with_field(whole, field, value))
 
-    def changed_entry(place: int, part: Any) -> Any:
-        return put(_with_entry(whole, "constraints", place, part))
+    def changed_entry(kind: str, place: int, part: Any) -> Any:
+        return put(_with_entry(whole, kind, place, part))
 
     for owner in owners:
         yield from _numbers_of_part(getattr(whole, owner), f"{prefix}{owner}", partial(changed, owner))
-    for i, part in enumerate(whole.constraints or ()):
-        yield from _numbers_of_part(part, f"{prefix}{title(part, i)}", partial(changed_entry, i))
+    for kind in ("constraints", "effects"):
+        for i, part in enumerate(getattr(whole, kind) or ()):
+            # Of effects only what is unknown is no constant.
+            if kind == "constraints" or part.adjustable:
+                owner = f"{prefix}{title(part, i)}"
+                yield from _numbers_of_part(part, owner, partial(changed_entry, kind, i))
 
 
 def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], Any]) -> Iterator[Number]:
@@ -208,7 +212,9 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], Any]) -> Iterat
         documented_as = field if field in entries else called
         own = getattr(part, "units_of_numbers", {})
         unit = entries[documented_as].unit if documented_as in entries else own.get(field, "")
-        value = getattr(part, field)
+        value, (inside, _, last) = at(part, field), field.rpartition(".")
+        if inside:
+            unit = documented(type(at(part, inside)).__doc__)[last].unit
         if isinstance(value, Boundary):
             # An end of a body that carries wheels is one of the body alone, and the wheels.
             yield from _numbers_of_part(value, owner, partial(_put_inside, put, part, field))
@@ -217,14 +223,15 @@ def _numbers_of_part(part: Any, owner: str, put: Callable[[Any], Any]) -> Iterat
                 inside = partial(_put_among, put, part, field, i)
                 yield from _numbers_of_part(one, f"{owner}_{part.names[i]}", inside)
             continue
+        called = called.replace(".", "_")
         words = f"{called.replace('_', ' ')} of the {owner.replace('_', ' ')} ({type(part).__name__})"
-        if _is_number(value):
+        if is_number(value):
             free = "; entries that the problem leaves free are ignored" if None in np.atleast_1d(value) else ""
             yield _number(part, field, f"{owner}_{called}", Term(unit, words + free), put)
 
 
 def _put_inside(put: Callable[[Any], Any], part: Any, field: str, twin: Any) -> Any:
-    return put(_with(part, field, twin))
+    return put(with_field(part, field, twin))
 
 
 def _put_among(put: Callable, part: Any, field: str, place: int, twin: Any) -> Any:
@@ -232,30 +239,17 @@ def _put_among(put: Callable, part: Any, field: str, place: int, twin: Any) -> A
 
 
 def _number(part: Any, field: str, name: str, term: Term, put: Callable[[Any], Any]) -> Number:
-    before = getattr(part, field)
+    before = at(part, field)
+    kind = Unknown if any(map(is_unknown, np.atleast_1d(np.array(before, object)))) else float
 
     def changed(values: np.ndarray) -> Any:
-        entries = tuple(None if np.isnan(value) else float(value) for value in values)
-        return put(_with(part, field, entries if np.ndim(before) else entries[0]))
+        entries = tuple(None if np.isnan(value) else kind(value) for value in values)
+        return put(with_field(part, field, entries if np.ndim(before) else entries[0]))
 
     return Number(name, np.atleast_1d(np.array(before, float)), term, changed)
-
-
-def _is_number(value: Any) -> bool:
-    """Whether a field holds a number or a column of numbers, of which some may be left free."""
-    entries = value if isinstance(value, tuple) else (value,)
-    numeric = [isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in entries]
-    return any(numeric) and all(known or entry is None for known, entry in zip(numeric, entries, strict=True))
-
-
-def _with(part: Any, field: str, value: Any) -> Any:
-    """A copy with another value in a field, without the checks of its constructor."""
-    twin = copy.copy(part)
-    object.__setattr__(twin, field, value)
-    return twin
 
 
 def _with_entry(whole: Any, field: str, place: int, part: Any) -> Any:
     """A copy with another part in a place of a field."""
     before = getattr(whole, field)
-    return _with(whole, field, (*before[:place], part, *before[place + 1 :]))
+    return with_field(whole, field, (*before[:place], part, *before[place + 1 :]))

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import Answer
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.motion.stability import refuse_unstable
@@ -37,7 +38,7 @@ class Planner:
         """The planner of a problem on equal steps; ValueError beyond the scheme's stability limit."""
         start = starting_guess(problem, check_mesh(steps), order, hold, guess)
         scene = Scene(problem, scheme(order), steps, hold)
-        refuse_unstable(scene.dynamics, start, problem.start_time, problem.duration_bounds)
+        refuse_unstable(Dynamics.of(problem), start, problem.start_time, problem.duration_bounds)
         return cls(scene, transcribe_onto(problem, start, units_of(problem, start)), start)
 
     @cached_property
@@ -83,6 +84,13 @@ class Planner:
         )
         return [*scene.names("places"), *scene.names("speeds"), "forces", *more]
 
+    def scaled_multipliers(self, multipliers: dict[str, ca.MX]) -> list[ca.MX]:
+        """Scaled multipliers of unknowns and of rows, from those in SI units by name."""
+        scaled = {name: symbol / ca.DM(self.multipliers[name]) for name, symbol in multipliers.items()}
+        lam = [ca.vec(ca.vertcat(*[scaled[name] for name in group])) for group in self.groups]
+        ends = [0, self.nlp.columns.size, self.nlp.columns.size + self.nlp.rows.size]
+        return ca.vertsplit(ca.vertcat(*lam), ends)
+
     def pack(self, plan: dict[str, Any]) -> ca.MX:
         """Scaled unknowns."""
         speeds = self.scene.joined(plan, "speeds")
@@ -115,6 +123,7 @@ class Planner:
             mass
             | states
             | reactions
+            | {name: numbers[name] for name in scene.constants}
             | {
                 "forces": found["force"],
                 "start_time": numbers["start_time"],
@@ -170,9 +179,7 @@ def solver(planner: Planner, options: dict[str, Any] | None, warm: bool) -> Expo
     multipliers = {name: ca.MX.sym(name, *one.shape) for name, one in planner.multipliers.items()}
     lower, upper, p = planner.numbers.bounds_and_parameters(_of_one_sign(numbers, plan))
     _, _, row_lower, row_upper = nlp.bounds(scene.problem)
-    scaled = {name: symbol / ca.DM(planner.multipliers[name]) for name, symbol in multipliers.items()}
-    lam = [ca.vec(ca.vertcat(*[scaled[name] for name in group])) for group in planner.groups]
-    lam_x, lam_g = ca.vertsplit(ca.vertcat(*lam), [0, nlp.columns.size, nlp.columns.size + nlp.rows.size])
+    lam_x, lam_g = planner.scaled_multipliers(multipliers)
     bounds = {"lbx": lower, "ubx": upper, "lbg": row_lower, "ubg": row_upper}
     x0 = ca.fmin(ca.fmax(planner.pack(plan), lower), upper)
     found = nlp.solver(options, warm)(x0=x0, p=p, lam_x0=lam_x, lam_g0=lam_g, **bounds)

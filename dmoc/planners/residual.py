@@ -21,7 +21,7 @@ def momenta(scene: Scene, path: dict[str, ca.MX]) -> list[ca.MX]:
     h, origin = path["duration"] / scene.steps, places[:, 0]
     q = ca.vertcat(*scene.at_nodes(places - ca.repmat(origin, 1, scene.nodes)))
     m = ca.vertcat(*scene.at_nodes(path["masses"])) if scene.burns else ca.MX(0, scene.steps)
-    same = ca.vertcat(h, origin, *([] if scene.burns else [path["mass"]]))
+    same = ca.vertcat(h, origin, *([] if scene.burns else [path["mass"]]), *scene.constants_in(path))
     times = step_times(scene.steps)(ca.vertcat(0, path["start_time"], h))[1]
     return list(_momenta_kernel(scene).map(scene.steps)(q, m, scene.split(path["forces"]), times, same))
 
@@ -40,11 +40,12 @@ def _momenta_kernel(scene: Scene) -> ca.Function:
     """(q, m, u, t, (h, origin, the mass if it is constant)) -> P_0 .. P_s of one step, or Z'P."""
     n, s = scene.dynamics.positions, scene.rule.degree
     q, u, t = ca.MX.sym("q", n * (s + 1)), ca.MX.sym("u", scene.controls * scene.step_columns), ca.MX.sym("t")
-    m, same = ca.MX.sym("m", s + 1 if scene.burns else 0), ca.MX.sym("same", n + (1 if scene.burns else 2))
-    masses = m if scene.burns else ca.repmat(same[-1], s + 1)
-    function = legendre_function(scene.dynamics, scene.rule.order, scene.hold)
-    h, origin = same[0], same[1 : n + 1]
-    parts = function(q, masses, u, t, h, origin)
+    lengths = np.cumsum([0, 1, n, *([] if scene.burns else [1]), *scene.constants.values()]).tolist()
+    m, same = ca.MX.sym("m", s + 1 if scene.burns else 0), ca.MX.sym("same", lengths[-1])
+    h, origin, *others = ca.vertsplit(same, lengths)
+    masses = m if scene.burns else ca.repmat(others[0], s + 1)
+    function = scene.closed(legendre_function(scene.dynamics, scene.rule.order, scene.hold))
+    parts = function(q, masses, u, t, h, origin, *others[0 if scene.burns else 1 :])
     if scene.turns:
         along = _along(scene)
         parts = [along(place + origin, part) for place, part in zip(ca.vertsplit(q, n), parts, strict=True)]
@@ -86,8 +87,9 @@ def _defect(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     h = duration / scene.steps
     parts = momenta(scene, path)
     v0, v1 = (scene.joined(path, "speed", prefix) for prefix in ("start_", "goal_"))
-    begin = scene.momentum(start_time, q[:, 0], v0, masses[0][0])
-    finish = scene.momentum(start_time + duration, q[:, -1], v1, last_mass)
+    constants = scene.constants_in(path)
+    begin = scene.momentum(start_time, q[:, 0], v0, masses[0][0], constants)
+    finish = scene.momentum(start_time + duration, q[:, -1], v1, last_mass, constants)
     arriving = ca.horzcat(begin, parts[-1][:, :-1])
     weight = [rule.weights[0] * h, *(w * h for w in rule.weights[1:-1])]
     # at a node between two steps the force acts for the end of one and the beginning of the other, so its row
@@ -124,7 +126,9 @@ def path_symbols(scene: Scene) -> dict[str, ca.MX]:
     """Symbols for what the residual of a path is made of."""
     mass = "masses" if scene.burns else "mass"
     ends = *scene.names("speed", "start_"), *scene.names("speed", "goal_")
-    return scene.symbols(*scene.names("places"), *ends, "forces", mass, "start_time", "duration")
+    return scene.symbols(
+        *scene.names("places"), *ends, "forces", mass, "start_time", "duration", *scene.constants
+    )
 
 
 def residual(scene: Scene) -> Exported:
@@ -162,8 +166,9 @@ def velocities_of(scene: Scene, path: dict[str, ca.MX]) -> ca.MX:
     times = path["start_time"] + path["duration"] * ca.DM(np.linspace(0, 1, scene.steps + 1)).T
     ends = slice(None, None, scene.rule.degree)
     mass = path["masses"][:, ends] if scene.burns else path["mass"]
-    velocity = scene.dynamics.velocity.map(scene.steps + 1)
-    return velocity(times, scene.joined(path, "places")[:, ends], p, mass)
+    velocity = scene.closed(scene.dynamics.velocity).map(scene.steps + 1)
+    constants = [ca.repmat(one, 1, scene.steps + 1) for one in scene.constants_in(path)]
+    return velocity(times, scene.joined(path, "places")[:, ends], p, mass, *constants)
 
 
 def largest_turn(scene: Scene, path: dict[str, ca.MX]) -> dict[str, ca.MX]:

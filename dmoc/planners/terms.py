@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 
+from dmoc.basics.docstrings import documented
+from dmoc.basics.unknown import at
 from dmoc.configurations import coordinates
+from dmoc.parts.rows import title, with_symbols
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,20 @@ def number_terms(names: Iterable[str]) -> dict[str, Term]:
     """Further arguments that are numbers of the actuator."""
     units = {"actuator_exhaust_velocity": "m/s"}
     return {name: Term(units.get(name, ""), "of the actuator, as in the problem") for name in names}
+
+
+def opened_effects(effects: Sequence[Any]) -> tuple[tuple, dict[str, int], dict[str, Term]]:
+    """Effects with symbols for their unknown constants, and sizes and meanings of these by their names."""
+    found, sizes, terms = [], {}, {}
+    for i, effect in enumerate(effects):
+        twin, symbols = with_symbols(effect, "effect")
+        found.append(twin if symbols else effect)
+        for one, symbol in zip(effect.adjustable, symbols, strict=True):
+            name, (inside, _, last) = f"{title(effect, i)}_{one.replace('.', '_')}", one.rpartition(".")
+            known = documented(type(at(effect, inside) if inside else effect).__doc__)
+            sizes[name] = symbol.numel()
+            terms[name] = Term(known[last].unit if last in known else "", f"{last} of {type(effect).__name__}")
+    return tuple(found), sizes, terms
 
 
 def named(name: str, given: dict[str, ca.MX], outputs: dict[str, ca.MX]) -> ca.Function:

@@ -7,8 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.configurations.acting import specific_lagrangian
 from dmoc.effects.base import Force
-from dmoc.motion.dynamics import Dynamics, specific_lagrangian
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.momenta import legendre_momenta

@@ -24,7 +24,7 @@ TURN = math.radians(1.0)
 # What changes the objective by less than this part of what changes it most is worth nothing [-].
 NOTHING = 1e-6
 # So many sentences are printed: those of the numbers that matter most.
-SENTENCES = 5
+SENTENCES = 6
 
 
 def worth_told(solution: Any) -> tuple[dict[str, Any], RenderableType]:

@@ -33,12 +33,16 @@ def change(
     coarse: tuple[DiscretePath, float],
     fine: tuple[DiscretePath, float],
     parts: np.ndarray,
+    least: float = TINY,
 ) -> tuple[float, float]:
-    """Relative change of path and objective from one mesh to the next, at the step ends they share."""
+    """Relative change of path and objective from one mesh to the next, at the step ends they share.
+
+    That of an objective below `least`, in its own unit, is over `least`: what costs nothing has no digits.
+    """
     shared = np.append(0, np.cumsum(parts)) * (fine[0].order // 2)
     moved = np.abs(fine[0].position[shared] - coarse[0].position[:: coarse[0].order // 2]).max(axis=0)
     stretched = abs(fine[0].duration - coarse[0].duration) / fine[0].duration
-    scale = max(abs(fine[1]), TINY)
+    scale = max(abs(fine[1]), least)
     moved = float((moved / path_scales(fine[0], _least(problem)).coordinates).max())
     return max(moved, stretched), abs(fine[1] - coarse[1]) / scale
 

@@ -8,6 +8,27 @@ from typing import Any
 from dmoc.scene.clock import dates_of
 from dmoc.scene.problem import TransferProblem
 
+# The first-order conditions of an answer may be off by this part of the objective or the force [-].
+OPTIMALITY = 1e-5
+# Where an accuracy was asked for they may be off by this part of it [-]: least fuel with time to spare has many
+# paths that cost the same to less, and the best of them on one mesh is not that on the next.
+OF_TOLERANCE = 0.1
+# They are never off by more than this [-].
+MOST_OFF = 1e-4
+
+# An answer that was held near its guess is an optimum if it is off one by less than this part of that [-].
+OFF_OPTIMUM = 0.5
+
+
+def optimality_limit(tolerance: float | None) -> float:
+    """By how much the first-order conditions may be off, of the objective or the force [-]."""
+    return max(OPTIMALITY, min(OF_TOLERANCE * (tolerance or 0.0), MOST_OFF))
+
+
+def off_optimum(tolerance: float | None = None) -> float:
+    """By how much an answer to a tolerance, or to none, may be pulled off its optimum [-]."""
+    return OFF_OPTIMUM * optimality_limit(tolerance)
+
 
 @dataclass(frozen=True)
 class Level:

@@ -8,8 +8,9 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.configurations.acting import state_symbols
 from dmoc.configurations.of_problem import configuration_of
-from dmoc.motion.dynamics import Dynamics, state_symbols
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes

@@ -106,7 +106,7 @@ class Outcome:
         Of a mission or a team the first column names the leg or the body. The force is that of the node; with
         hold it is that of the step behind it.
         """
-        return _shown("table")(self)
+        return shown("table")(self)
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """The figure of `dmoc plot`: a matplotlib Figure or, with a path, that file.
@@ -121,11 +121,11 @@ class Outcome:
         ValueError
             If the suffix is another one or the folder does not exist.
         """
-        return _shown("plot")(self, path)
+        return shown("plot")(self, path)
 
     def animate(self, path: str | os.PathLike, frames: int = 80) -> None:
         """Write a moving picture, .gif or .mp4, as `dmoc.animate` does."""
-        _shown("animate")(self, path, frames)
+        shown("animate")(self, path, frames)
 
     def facts(self) -> Any:
         """What users ask of an answer: velocity change, propellant, closest approach, clearance, orbits.
@@ -141,14 +141,14 @@ class Outcome:
         ValueError
             If it was loaded from a file and its problem is not found.
         """
-        return _shown("facts")(self)
+        return shown("facts")(self)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the figure, the closing line, facts, checks and the meshes on the way."""
-        return _shown("html")(self)
+        return shown("html")(self)
 
 
-def _shown(what: str) -> Any:
+def shown(what: str) -> Any:
     """What shows an answer, by its name in `dmoc.notebook.front`.
 
     Pictures and reports are made from answers and import them, so that answers must not import these: whoever

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import time_unit
-from dmoc.motion.dynamics import state_symbols
+from dmoc.configurations.acting import state_symbols
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key

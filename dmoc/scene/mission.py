@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from dmoc.basics.arguments import both_ends, checked, entries, number, short
-from dmoc.basics.duties import Named
+from dmoc.basics.docstrings import Named
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
-from dmoc.basics.duties import Named
-from dmoc.configurations.of_problem import free_configuration
+from dmoc.basics.docstrings import Named
+from dmoc.configurations.of_problem import free_configuration, unknown_parts
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.mixed import with_both
@@ -168,7 +168,7 @@ class TransferProblem(Named):
     def adjustable_parts(self) -> tuple:
         """Parts with numbers that may change from one solve to the next without a rebuild."""
         # The stencils and the parameter vector of an NLP both follow this order.
-        return (self.actuator, self.objective, self.start, self.goal, *self.constraints)
+        return (self.actuator, self.objective, self.start, self.goal, *self.constraints, *unknown_parts(self))
 
     @property
     def inertias(self) -> list[Any]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, short
-from dmoc.basics.duties import Named
+from dmoc.basics.docstrings import Named
 from dmoc.legs.together import Together
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import snake

@@ -18,6 +18,7 @@ from dmoc.nlp.kernel import Kernel
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 from dmoc.planners.numbers import Numbers, numbers_of_team
+from dmoc.sensitivity.constants import with_open_effects
 
 # The derivatives by parameters of so many kernels are held in this process.
 _BY_PARAMETERS = Shelf(50)
@@ -47,8 +48,12 @@ class Optimum:
     sense: float
 
     @classmethod
-    def of(cls, solution: Any, problem: Any) -> Optimum:
-        """That of a solution, of a transfer, a mission or a team, with its problem."""
+    def of(cls, solution: Any, problem: Any, opened: bool = True) -> Optimum:
+        """That of a solution, of a transfer, a mission or a team, with its problem.
+
+        Opened, the constants of effects are parameters of it.
+        """
+        problem = with_open_effects(problem) if opened else problem
         if hasattr(problem, "plan") or hasattr(problem, "members"):
             return cls._of_mission(solution, problem)
         path = solution.path

@@ -22,7 +22,7 @@ _HELD = Shelf(4)
 # What the entries of a column are called.
 AXES = ("x", "y", "z")
 # Units of what has axes in space or in the body.
-ALONG_AXES = ("m", "m/s", "N", "rad/s", "N m")
+ALONG_AXES = ("m", "m/s", "m/s^2", "N", "rad/s", "N m")
 # The entries of numbers that bound what is free between them, by the ends of their names.
 SPANS = {"durations": ("least", "most"), "start_times": ("earliest", "latest")}
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from dmoc.guess.open_ends import end_estimates, velocity_change_between
+from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import Ladder
+from dmoc.solver.ladder import WIDER, Ladder
 from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
 from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
@@ -24,6 +24,11 @@ TO_SPARE = 0.3
 MOST_EFFORT = 100
 # Each answer that is held near the one before takes this many at most: those of eleven transfers took 3 to 33.
 MOST_NEAR = 60
+# An answer from two burns is held near them as strongly as this [-], with |F| rounded more and then as asked.
+# Held less, or with |F| rounded as asked at once, some of nine transfers between circles led nowhere.
+NEAR_BURNS = 0.1
+# That takes at most this many iterations each time: the nine transfers took 13 to 53.
+MOST_FROM_BURNS = 100
 
 
 def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
@@ -51,12 +56,34 @@ def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
     return rung
 
 
-def flat_optimum(ladder: Ladder, first: DiscretePath) -> Rung | None:
-    """An optimum on the mesh of a guess by way of the path of least effort, or None."""
-    rung = held_near_least_effort(ladder, first)
-    if rung is None or rung.stopped:
-        return rung
-    return let_go(ladder.try_on, rung, HELD[0])
+def flat_optimum(ladder: Ladder, first: DiscretePath, tolerance: float | None = None) -> Rung | None:
+    """An optimum on the mesh of a guess by way of two burns or of the path of least effort, or None."""
+    for held in (held_near_two_burns, held_near_least_effort):
+        rung = held(ladder, first)
+        if rung is not None and rung.solved:
+            rung = let_go(ladder.try_on, rung, HELD[0], tolerance)
+        if rung is not None:
+            return rung
+    return None
+
+
+def held_near_two_burns(ladder: Ladder, first: DiscretePath) -> Rung | None:
+    """An answer on the mesh of a guess that is held near a path of two short burns, or None.
+
+    From the path of least effort, with thrust all along, most attempts lead nowhere on the way to few burns.
+    """
+    if not _may_be_flat(ladder.problem) or first.multipliers:
+        return None
+    path = two_burns(ladder.problem, first)
+    if path is None:
+        return None
+    rounding = ladder.problem.actuator.smoothing
+    for width in [None] if rounding is None else [WIDER * rounding, None]:
+        rung = ladder.try_on(path, width, MOST_FROM_BURNS, lean=NEAR_BURNS)
+        if not rung.solved:
+            return rung if rung.stopped else None
+        path = rung.path
+    return rung
 
 
 def _may_be_flat(problem: TransferProblem) -> bool:

@@ -1,16 +1,15 @@
-"""Free time around an attractor: the number of revolutions is a choice between optima, and each is tried."""
+"""A free time in which motion turns or swings: each revolution or swing may hold an optimum, all are tried."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import lasting
-from dmoc.guess.coast import MANY_TURNS
-from dmoc.guess.open_ends import end_estimates
-from dmoc.guess.starting import controls_for, guess_duration, starting_guess
+from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
+from dmoc.guess.open_ends import end_estimates, swings
+from dmoc.guess.starting import guess_duration, starting_guess
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -24,6 +23,8 @@ from dmoc.solver.rung import Rung
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.
 SPACING = 0.5
+# A swing may hold two optima, in a short part of it: durations are tried so close to each other, in swings.
+OF_A_SWING = 0.2
 # At most this many durations are tried.
 MOST_TRIED = 16
 # Where the durations that are allowed differ by less than this, in revolutions, there is nothing to choose.
@@ -69,13 +70,15 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
 
     For each duration the path of least effort without a limit of the force is found, which takes a few
     iterations. The problem itself is solved from those that promise most, first with their durations, then
-    with that of the best one freed. None where there is no choice: the duration is fixed, nothing attracts
-    alone, an end leaves all open, or the shortest and the longest duration hardly differ.
+    with that of the best one freed. None where there is no choice: the duration is fixed, nothing turns or
+    swings, an end leaves all open, or the shortest and the longest duration hardly differ.
     """
     problem = ladder.problem
     soundings = [found for duration in _durations(problem) if (found := _sounding(ladder, duration))]
     if len(soundings) < 2:
         return None
+    if problem.attraction.lone is None:
+        soundings = _valleys(soundings)
     soundings.sort(key=lambda one: (one.excess, one.cost))
     order = order or (2 if hold else ORDER_OF_MANY_TURNS)
     best: Rung | None = None
@@ -97,6 +100,25 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
         freed = ladder.try_on(start, lean=lean)
         start = freed.path if freed.solved else start
     return freed if freed.solved else best
+
+
+def _valleys(soundings: list[Sounding]) -> list[Sounding]:
+    """The soundings that promise less than those beside them, each with what a duration near it may promise.
+
+    That is twice as far below it as the lowest place of a parabola through the three: between two soundings the
+    cost may fall to next to nothing.
+    """
+    found = []
+    for i, one in enumerate(soundings):
+        near = soundings[max(i - 1, 0) : i + 2]
+        if any((other.excess, other.cost) < (one.excess, one.cost) for other in near):
+            continue
+        cost, after = one.cost, [other.path.duration - one.path.duration for other in near]
+        if len(near) == 3 and not any(other.excess for other in near):
+            bend, slope, _ = np.polyfit(after, [other.cost for other in near], 2)
+            cost -= 0.5 * slope**2 / bend if bend > 0 else 0.0
+        found.append(replace(one, cost=cost, pinned=False))
+    return found
 
 
 def _shortest_alike(ladder: Ladder, best: Rung, soundings: list[Sounding], hold: bool) -> Rung:
@@ -129,22 +151,26 @@ def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
 def _durations(problem: TransferProblem) -> list[float]:
     """Durations to try [s]; none where there is no choice."""
     shortest, longest = problem.duration_bounds
-    if not problem.free_duration or problem.guess is not None or problem.attraction.lone is None:
+    if not problem.free_duration or problem.guess is not None:
         return []
-    places = np.array([position for position, _ in end_estimates(problem, shortest)])
-    if not np.isfinite(places).all():
-        return []
-    rate = problem.attraction.rates(places).max() / (2 * np.pi)
-    if not (problem.start.anchored and problem.goal.anchored):
-        # To an orbit as a whole more revolutions than are likely cost much the same, and the soundings
-        # of many take long.
-        likely = guess_duration(problem)
-        longest = min(longest, LONG * likely)
-        if likely * rate > MANY_TURNS:
+    spacing = SPACING
+    if problem.attraction.lone is None:
+        rate, spacing = swings(problem), OF_A_SWING
+    else:
+        places = np.array([position for position, _ in end_estimates(problem, shortest)])
+        if not np.isfinite(places).all():
             return []
+        rate = problem.attraction.rates(places).max() / (2 * np.pi)
+        if not (problem.start.anchored and problem.goal.anchored):
+            # To an orbit as a whole more revolutions than are likely cost much the same, and the soundings
+            # of many take long.
+            likely = guess_duration(problem)
+            longest = min(longest, LONG * likely)
+            if likely * rate > MANY_TURNS:
+                return []
     if longest * rate < HALF_ROUND or (longest - shortest) * rate < NO_CHOICE:
         return []
-    count = int(np.clip(np.ceil((longest - shortest) * rate / SPACING) + 1, 2, MOST_TRIED))
+    count = int(np.clip(np.ceil((longest - shortest) * rate / spacing) + 1, 2, MOST_TRIED))
     return np.linspace(shortest, longest, count).tolist()
 
 
@@ -169,20 +195,10 @@ def promise(problem: TransferProblem, rung: Rung) -> Sounding:
     if control is None:
         control = np.zeros((len(path.control), problem.controls))
         return Sounding(replace(path, control=control), excess, effort, problem.free_duration, effort)
-    flown = _with_mass(problem, replace(path, control=control))
+    flown = with_mass(problem, replace(path, control=control))
     cost = problem.objective.sense * cost_along(problem, flown)
     paid = cost_along(problem, replace(path, control=0 * control)) != cost_along(problem, flown)
     pinned = problem.free_duration and paid
     most = np.inf if limit is None else limit
     within = control * min(1.0, most / np.linalg.norm(path.control, axis=1).max(initial=0.0))
     return Sounding(replace(path, control=within), excess, cost, pinned, effort)
-
-
-def _with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
-    """The path with the mass that its controls leave, at least half of it."""
-    if not problem.actuator.burns:
-        return path
-    u = ca.SX.sym("u", problem.controls)
-    flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
-    burnt = path.duration * np.cumsum(node_weights(path.mesh, scheme(path.order)) * flow)
-    return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))

@@ -17,7 +17,7 @@ from dmoc.ipopt.run import Answer
 from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
-from dmoc.results.facts import Level
+from dmoc.results.facts import Level, off_optimum
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.clock import cautions_of
@@ -26,9 +26,6 @@ from dmoc.scene.problem import TransferProblem
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
 WORTH_TELLING = 1e-5
-# An answer that was held near its guess is an optimum if it is off one by less than this [-], half of what the
-# check called optimality allows.
-OFF_OPTIMUM = 5e-6
 # Where many paths cost the same an answer is held near its guess as strongly as this or, where that leads
 # nowhere, as the next [-].
 HELD = (1e-2, 1e-3)
@@ -127,7 +124,7 @@ def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: Di
     return None
 
 
-def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
+def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float, tolerance: float | None = None) -> Rung | None:
     """An optimum from an answer that was held so strongly; None if there is no way to it in a few attempts.
 
     Each answer is held near the one before, and begins with its multipliers: a switch then moves by little.
@@ -136,7 +133,7 @@ def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
     """
     share = LESS
     for _ in range(MOST_LET_GO):
-        if rung.pull <= OFF_OPTIMUM:
+        if rung.pull <= off_optimum(tolerance):
             return rung
         tried = try_on(rung.path, most=MOST_LETTING_GO, pinned=rung.pinned, lean=share * lean)
         if tried.stopped:
@@ -151,13 +148,13 @@ def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung | None:
     return None
 
 
-def at_rest(try_on: Callable[..., Rung], rung: Rung, lean: float) -> Rung:
+def at_rest(try_on: Callable[..., Rung], rung: Rung, lean: float, tolerance: float | None = None) -> Rung:
     """An optimum near a held answer on the same mesh, if there is a way to it; else that answer.
 
     On the first of several meshes it takes little, and all later answers begin near their own: that of the
     coarse trial lies a long way up a flat valley from them, and to go down there took minutes on the last mesh.
     """
-    found = let_go(try_on, rung, lean)
+    found = let_go(try_on, rung, lean, tolerance)
     # Another optimum that costs a hundredth more is no better answer.
     if found is None or found.stopped or found.cost - rung.cost > 0.01 * abs(rung.cost):
         return rung

@@ -19,7 +19,7 @@ from dmoc.results.estimate import (
     local_errors,
     rounding_cost,
 )
-from dmoc.results.facts import Error
+from dmoc.results.facts import Error, off_optimum
 from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, has_linear_controls, is_singular, switches_in_words
@@ -28,7 +28,7 @@ from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, best_order, order_of_smooth, trial_path, with_as_many_nodes
-from dmoc.solver.rung import OFF_OPTIMUM, Rung, at_rest
+from dmoc.solver.rung import Rung, at_rest
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
@@ -45,8 +45,7 @@ ROUNDING_SHARE = 0.5
 MOST_SHARPENING = 200
 # |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
 LEAST_ROUNDING = 1e-8
-# Durations are equally good if, to first order, a change by this part of the duration costs no more than the
-# tolerance.
+# Durations are equally good if a change by this part of them costs, to first order, at most the tolerance [-].
 EQUALLY_GOOD = 0.1
 # Where the cost is linear in controls and its optimum flat, an answer is held near that on the mesh before, by
 # so many times the tolerance [-]: seven flat optima then met tolerances that none had met.
@@ -58,9 +57,10 @@ SAME_COST = 0.3
 # Where the cost changes more than the path, and that falls by less than this factor from mesh to mesh [-],
 # all steps are cut, and not those alone that make the error of the path.
 SLOW = 2.0
-# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-]:
-# elsewhere both change alike.
+# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-].
 FLAT = 0.03
+# Costs below this part of the unit of cost are nothing [-]: a target may be met by a coast alone.
+NOTHING = 1e-3
 # A refinement of more iterations than this wanders: others take 20 to 90.
 LONG = 100
 # One that is not held ends after this many: then it is tried anew, and held.
@@ -88,7 +88,7 @@ def climb_to_tolerance(
         # Nothing can switch, so that no trial is needed.
         order = order_of_smooth(tol)
         first = starting_guess(ladder.problem, with_as_many_nodes(first, order), order, hold, guess)
-    trial = flat_optimum(ladder, first)
+    trial = flat_optimum(ladder, first, tol)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
     if guess is None:
@@ -126,7 +126,7 @@ class _Refinement:
 
     def __init__(self, ladder: Ladder, tol: float, local: bool, reason: str):
         self.ladder, self.problem, self.tol = ladder, ladder.problem, tol
-        self.local, self.reason = local, reason
+        self.local, self.reason, self.off = local, reason, off_optimum(tol)
         self.changes: list[tuple[float, float]] = []
         self.errors: dict[int, float] = {}
         self.best: _Found | None = None
@@ -146,19 +146,20 @@ class _Refinement:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
                 return self.settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
-            if not self.changes and rung.pull > OFF_OPTIMUM:
-                rung = at_rest(self.ladder.try_on, rung, self.lean)
+            if not self.changes and rung.pull > self.off:
+                rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)
             fine = rung.path
-            self.changes.append(change(self.problem, (coarse, cost), (fine, rung.level.objective), parts))
+            now, least = (fine, rung.level.objective), NOTHING * rung.nlp.units.cost
+            self.changes.append(change(self.problem, (coarse, cost), now, parts, least))
             self._hold_if_flat(rung)
             if rung.pinned and not self.flat:
                 self.flat = True
                 self.reason += "; durations cost the same, one was kept"
             met = self._judge(rung, fine, most)
-            if met and rung.pull > OFF_OPTIMUM:
+            if met and rung.pull > self.off:
                 rung = self._released(rung)
-                self.best = None if rung.pull <= OFF_OPTIMUM else self.best
-                met = self._judge(rung, rung.path, most) and rung.pull <= OFF_OPTIMUM
+                self.best = None if rung.pull <= self.off else self.best
+                met = self._judge(rung, rung.path, most) and rung.pull <= self.off
             if met:
                 self._sharpen(rung, most)
             if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
@@ -226,7 +227,7 @@ class _Refinement:
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        if (found := at_rest(self.ladder.try_on, rung, self.lean)) is rung:
+        if (found := at_rest(self.ladder.try_on, rung, self.lean, self.tol)) is rung:
             return rung
         before, after = ((one.path, one.level.objective) for one in (rung, found))
         moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))

@@ -29,8 +29,9 @@ from dmoc import (
     tabulated_motion,
 )
 from dmoc.checks.verification import verify
+from dmoc.configurations.acting import split_effects
 from dmoc.configurations.base import Translation
-from dmoc.motion.dynamics import Dynamics, split_effects
+from dmoc.motion.dynamics import Dynamics
 
 MU, RADIUS = 3.986004418e14, 6.378137e6
 MOON = circular_motion(3.844e8, 2.66e-6, 0.3, 0.4)

@@ -114,6 +114,15 @@ MAKES = {
     "CylindricalShadow": {"radius": 1.0, "sharpness": 10.0},
     "Drag": {"area": 1.0, "drag_coefficient": 1.0, "atmosphere": UniformAtmosphere(1.0)},
     "Drop": {"mass": 0.1},
+    "Flight": {
+        "times": [0.0, 1.0, 2.0],
+        "positions": [[0.0], [1.0], [2.0]],
+        "forces": [[0.0], [0.0], [0.0]],
+        "velocities": None,
+        "attitudes": None,
+        "rates": None,
+    },
+    "Unknown": {"value": 1.0, "sigma": 0.5},
     "Engine": {
         "max_thrust": 2.0,
         "specific_impulse": 300.0,
@@ -415,7 +424,7 @@ def try_making(name, argument, value):
     part = answered(lambda: getattr(dmoc, name)(**(MAKES[name] | {argument: value})))
     if part is None or answered(lambda: as_mission(part) or as_team(part)) is not None:
         return
-    if isinstance(part, (Mission, Leg, Event, Free, Team, Together)):
+    if isinstance(part, (Mission, Leg, Event, Free, Team, Together, dmoc.Flight, dmoc.Unknown)):
         return
     problem = answered(lambda: put_to_use(part))
     if problem is not None:
@@ -446,6 +455,7 @@ def test_every_constructor_is_tried():
         "Body",
         "Check",
         "Dispersion",
+        "Estimate",
         "Evidence",
         "Formulation",
         "MissionSolution",
@@ -484,6 +494,10 @@ def test_constructors_and_any_value(name, data):
     try_making(name, data.draw(st.sampled_from(list(MAKES[name]))), data.draw(ANYTHING))
 
 
+# A flight of which the mass is asked.
+SEEN = dmoc.Flight(
+    [0.0, 1.0, 2.0, 3.0, 4.0], [[0.0], [0.5], [2.0], [3.5], [4.0]], [[1.0], [1.0], [-1.0], [-1.0], [0.0]]
+)
 # Solutions of 4 steps are quick, whatever else is asked for.
 CALLS = {
     "convert": (
@@ -497,6 +511,43 @@ CALLS = {
     "drift": (
         dmoc.drift,
         {"problem": kepler(0.1), "revolutions": 2, "methods": {"order 2": (30,)}, "period": 6.0},
+    ),
+    "fly": (
+        dmoc.fly,
+        {
+            "times": [0.0, 1.0, 2.0],
+            "forces": [[0.0], [1.0], [0.0]],
+            "start": dmoc.State((0,), (0,)),
+            "mass": 2.0,
+            "effects": [],
+            "actuator": None,
+            "offset": (0.1,),
+            "strength": 1.0,
+            "delay": 0.1,
+            "noise": 0.1,
+            "force_noise": 0.1,
+            "velocity_noise": 0.1,
+            "dropped": 0.1,
+            "seed": 1,
+        },
+    ),
+    "identify": (
+        dmoc.identify,
+        {
+            "flight": SEEN,
+            "mass": dmoc.Unknown(2.0),
+            "effects": [],
+            "actuator": None,
+            "inertia": None,
+            "offset": None,
+            "center": None,
+            "strength": 1.0,
+            "turn": None,
+            "delay": 0.0,
+            "noise": 0.1,
+            "force_noise": 0.1,
+            "order": 4,
+        },
     ),
     "load": (dmoc.load, {"path": "nothing.nc"}),
     "predict": (dmoc.predict, {"mass": 2.0, "goal_position": (1.0, 1.0)}),
@@ -565,6 +616,10 @@ VERBS = {
     ),
     "disperse": (["nothing.nc"], ["--start", "--force", "--pointing", "--samples", "--seed", "--plot"]),
     "effects": (["point_to_point", *STEPS], ["--order", "--steps", "--set"]),
+    "identify": (
+        ["free_flyer", "--noise", "0.001"],
+        ["--unknown", "--mass", "--noise", "--force-noise", "--order", "--out", "--plot"],
+    ),
     "check": (["nothing.nc"], ["--problem"]),
     "plot": (["nothing.nc"], ["--out", "--problem"]),
     "export": (["point_to_point", "out", *STEPS, "--no-c"], ["--order", "--steps", "--set"]),

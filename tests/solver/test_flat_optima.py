@@ -24,12 +24,15 @@ from dmoc import (
     solve,
     verify,
 )
+from dmoc.guess.open_ends import two_burns
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_weights
+from dmoc.results.facts import off_optimum
 from dmoc.results.flown_cost import unpriced
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import trial_path
-from dmoc.solver.rung import OFF_OPTIMUM
 
 CROSS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 # from place to place in a frame that turns; duality proves that the least fuel is 0.8653420757 N s
@@ -183,16 +186,38 @@ CIRCLES = TransferProblem(
 )
 
 
-def test_with_thrust_to_spare_least_fuel_begins_near_least_effort():
+def test_with_thrust_to_spare_least_fuel_begins_near_two_burns():
+    """From the path of least effort, with thrust all along, it was a long way on which most attempts failed."""
     ladder = Ladder(CIRCLES)
     with ladder.interrupt:
         rung = flat_optimum(ladder, trial_path(CIRCLES, 4, None, False))
-    assert rung is not None and rung.solved and rung.pull <= OFF_OPTIMUM
-    # On 28 steps; 0.0272713 on 843.
-    assert rung.level.objective == pytest.approx(0.0272606, rel=1e-5)
+    assert rung is not None and rung.solved and rung.pull <= off_optimum()
+    # Two impulses burn 0.02701 kg; 28 steps cannot tell a switch to better than a hundredth of that.
+    assert rung.level.objective == pytest.approx(0.02701, rel=1e-2)
+    assert all(one.solved and not one.level.question for one in ladder.rungs)
+
+
+def test_where_half_an_ellipse_takes_too_long_least_fuel_begins_near_least_effort():
+    hurried = replace(CIRCLES, duration=3.5)
+    ladder = Ladder(hurried)
+    with ladder.interrupt:
+        flat_optimum(ladder, trial_path(hurried, 4, None, False))
     assert ladder.rungs[0].level.question == "least effort"
-    held = [one for one in ladder.rungs[1:5] if one.level.iterations <= 10]
-    assert len(held) == 4
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_two_burns_have_the_impulses_of_hohmann_and_burn_their_propellant(hold):
+    first = trial_path(CIRCLES, 4, 60, hold)
+    path = two_burns(CIRCLES, first)
+    assert path is not None
+    radius, exhaust = 1.2118842475446392, 3.30592923439145
+    change = np.sqrt(2 * radius / (1 + radius)) - 1 + (1 - np.sqrt(2 / (1 + radius))) / np.sqrt(radius)
+    weights = np.diff(path.mesh) if hold else node_weights(path.mesh, scheme(4))
+    assert path.duration * weights @ path.control[:, -1] == pytest.approx(change, rel=1e-6)
+    assert 1 - path.mass[-1] == pytest.approx(change / exhaust, rel=1e-2)
+    radii = np.linalg.norm(path.position, axis=1)
+    assert radii[0] == pytest.approx(1.0) and radii[-1] == pytest.approx(radius, rel=1e-6)
+    assert (np.diff(radii) > -1e-6).all()
 
 
 def test_with_little_thrust_to_spare_least_fuel_is_sought_as_ever():
@@ -219,4 +244,24 @@ def test_a_flat_optimum_is_let_go_before_the_last_mesh():
     solution = solve(problem, tol=1e-4).raise_for_status()
     change = abs(np.sqrt(2 * radius / (1 + radius)) - 1) + abs(1 - np.sqrt(2 / (1 + radius))) / np.sqrt(radius)
     assert solution.objective == pytest.approx(1 - np.exp(-change / exhaust), rel=1e-4)
-    assert solution.iterations < 1000 and verify(solution).ok
+    assert solution.iterations < 600 and verify(solution).ok
+
+
+def test_nozzles_that_cancel_leave_the_check_of_optimality_a_unit_of_cost():
+    """All nozzles at once, held weaker than is typical, made an effort of 2e-8 of one: that was the unit."""
+    away = TransferProblem(
+        1.1784004729244795,
+        State(
+            (-0.6939588275072724, -0.12840029909412712, -0.7084733650020094),
+            (-0.18193774567831508, 0.9833100511524799, 0.0),
+        ),
+        State(
+            (0.15014477873795257, 0.7921989579771114, 0.3580244420446077),
+            (0.7379538593451797, -0.4304077361850586, 0.689269558674312),
+        ),
+        7.8843270934115,
+        effects=[PointGravity(1.0)],
+        actuator=Nozzles([*np.eye(3), *-np.eye(3)], 0.08006068239482939),
+    )
+    solution = solve(away, order=6, hold=True).raise_for_status()
+    assert {check.name: check.ok for check in verify(solution).checks}["optimality"]

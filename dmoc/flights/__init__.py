@@ -1,0 +1,1 @@
+"""Flights as they were measured, and flights that are made for tests and for planning."""

@@ -1,0 +1,1 @@
+"""Identification: numbers of a body from a flight, by the discrete equations run backwards."""
