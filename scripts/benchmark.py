@@ -2,6 +2,8 @@
 
     ./scripts/run python scripts/benchmark.py                 under three minutes
     ./scripts/run python scripts/benchmark.py --json out.json --largest 100000
+    ./scripts/run python scripts/benchmark.py --peers         beside ASSET and CasADi by hand, eight minutes
+    ./scripts/run python scripts/benchmark.py --peers --write  and into docs/peers.md
 
 Ratios are between medians of runs that take turns, so that whatever else the computer does falls on both
 alike. Iterations and evaluations stand beside the seconds: they do not depend on the computer. dmoc remembers
@@ -34,6 +36,7 @@ from benchmark_report import (
     show_verdicts,
     verdicts,
 )
+from peers import table, turns
 
 from dmoc import BallForce, PointGravity, State, TransferProblem, solve, transcribe, verify
 from dmoc.guess.starting import starting_guess
@@ -237,12 +240,34 @@ def measure(largest: int) -> dict[str, Any]:
     return results
 
 
+def beside_peers(repeats: int, asset: str, write: bool) -> list[dict[str, Any]]:
+    """Every tool to every accuracy, shown and, if asked for, written into the page."""
+    bench = turns.Bench(asset, console.print)
+    runs = turns.compared(bench, repeats)
+    table.show(runs, console)
+    if write:
+        table.write(runs, bench.version_of_asset())
+    return table.facts(runs)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures here")
     parser.add_argument("--largest", type=int, default=25_600, help="most steps to take apart (100000: slow)")
+    peers = parser.add_argument_group("beside ASSET and CasADi by hand")
+    peers.add_argument("--peers", action="store_true", help="measure these, and nothing else")
+    peers.add_argument("--repeats", type=int, default=9, help="processes of each run; medians count")
+    peers.add_argument("--asset", default=sys.executable, metavar="PYTHON", help="interpreter that has ASSET")
+    peers.add_argument("--write", action="store_true", help="write the table into docs/peers.md")
     given, begun = parser.parse_args(), time.perf_counter()
-    results = measure(given.largest)
+    if given.repeats < 1:
+        parser.error(f"--repeats must be at least 1; got {given.repeats}")
+    if given.write and not given.peers:
+        parser.error("--write is for the table of --peers; give both")
+    if given.peers:
+        results: Any = beside_peers(given.repeats, given.asset, given.write)
+    else:
+        results = measure(given.largest)
     console.print(f"\n{time.perf_counter() - begun:.0f} s")
     if given.json is not None:
         given.json.write_text(json.dumps(results, indent=2))

@@ -74,6 +74,7 @@ ELSEWHERE = {
     "python scripts/references.py --write": "tests/scene/test_problems.py holds every row",
     "python scripts/effects_cost.py --write": "it writes the page; a test of the studies runs it",
     "python scripts/accuracy.py --write": "it writes the page, in minutes",
+    "python scripts/benchmark.py --peers --write": "likewise; tests/studies/test_peers.py runs its parts",
     "python scripts/campaign.py --each 50 --journal campaign.jsonl --write": "it takes an hour",
     "python scripts/identification.py": "it takes minutes and the extra study; tests hold what it shows",
     "python scripts/gallery.py": "it writes the pictures; tests/scene/test_problems.py solves every problem",
