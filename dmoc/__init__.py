@@ -157,6 +157,7 @@ if TYPE_CHECKING:
     from dmoc.studies.accuracy import work_precision as work_precision
     from dmoc.studies.drift import drift as drift
     from dmoc.studies.flights import simulate as simulate
+    from dmoc.studies.flights import simulate_team as simulate_team
     from dmoc.sweeps.sweep import sweep as sweep
     from dmoc.teams.solution import TeamSolution as TeamSolution
 

@@ -28,6 +28,7 @@ LAYERS = [
     ["nlp"],
     ["diagnosis"],
     ["solver", "checks"],
+    ["chains"],
     ["missions"],
     ["teams"],
     ["structure"],

@@ -35,11 +35,11 @@ from dmoc.cli.options import (
     attached,
     ends_at_once,
     fail,
+    not_a_team,
     problem_of,
     seen,
     show_answer,
     switch,
-    transfer_of,
     writable,
 )
 
@@ -143,7 +143,7 @@ def effects(
     from dmoc.reports.tables import influence_table
     from dmoc.studies.effects import influences
 
-    problem = transfer_of(name, settings, "effects")
+    problem = not_a_team(name, settings, "effects")
     solution = dmoc.solve(problem, order=order, steps=steps, hold=hold)
     if not solution.success:
         show_answer(solution, None, as_json=False)

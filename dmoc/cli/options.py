@@ -114,18 +114,13 @@ def problem_of(name: str, settings: list[str] | None) -> tuple[ProblemFile, Any]
     return file, getattr(problem, "alone", None) or problem
 
 
-def transfer_of(name: str, settings: list[str] | None, verb: str) -> Any:
-    """The problem of a verb that has no meaning for a mission of several legs or a team of bodies."""
+def not_a_team(name: str, settings: list[str] | None, verb: str) -> Any:
+    """The problem of a verb that has no meaning for a team of bodies."""
     problem = problem_of(name, settings)[1]
     if hasattr(problem, "together"):
         raise ValueError(
-            f"dmoc {verb} takes a transfer, but {name} is a team of bodies; state the body that you mean as a "
-            "TransferProblem"
-        )
-    if hasattr(problem, "plan"):
-        raise ValueError(
-            f"dmoc {verb} takes a transfer, but {name} is a mission of legs; state the leg that you mean as a "
-            "TransferProblem"
+            f"dmoc {verb} takes a transfer or a mission, but {name} is a team of bodies; state the body that "
+            "you mean as a TransferProblem"
         )
     return problem
 

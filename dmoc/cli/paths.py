@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -44,7 +44,37 @@ def simulate(
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         _, problem = problem_of(name, settings)
         known = None if controls is None else dmoc.load(controls).attach(problem)
-        trajectory = dmoc.simulate(problem, known, steps, 2 if order is None else order, hold)
+        given = steps, 2 if order is None else order, hold
+        if hasattr(problem, "together"):
+            flights = dmoc.simulate_team(problem, known, *given)
+        else:
+            trajectory = dmoc.simulate(problem, known, *given)
+    if hasattr(problem, "together"):
+        told = [
+            _told(flights[body], one, _of_body(out, body), _of_body(plot, body), known is None, as_json)
+            for body, one in zip(problem.names, problem.members, strict=True)
+        ]
+        if as_json:
+            from dmoc.reports.as_json import as_text
+
+            print(as_text({"problem": problem.name, "bodies": dict(zip(problem.names, told, strict=True))}))
+        return
+    found = _told(trajectory, problem, out, plot, known is None, as_json)
+    if as_json:
+        from dmoc.reports.as_json import as_text
+
+        print(as_text(found))
+
+
+def _of_body(path: Path | None, body: str) -> Path | None:
+    """The file of one body of a team beside the one that was named."""
+    return None if path is None else path.with_stem(f"{path.stem}_{body.replace(' ', '_')}")
+
+
+def _told(
+    trajectory: Any, problem: Any, out: Path | None, plot: Path | None, coast: bool, as_json: bool
+) -> Any:
+    """Write and tell of one flight; the JSON object if that is asked for."""
     if out is not None:
         from dmoc.conversions.marched import write_marched
 
@@ -56,14 +86,14 @@ def simulate(
     if as_json:
         from dmoc.reports import as_json as report_json
 
-        print(report_json.as_text(report_json.motion_object(trajectory, problem, coast=known is None)))
-        return
+        return report_json.motion_object(trajectory, problem, coast)
     from dmoc.reports import words as report
 
     console = report.console()
-    console.print(report.motion(trajectory, problem, coast=known is None))
+    console.print(report.motion(trajectory, problem, coast=coast))
     for path in filter(None, (out, plot)):
         console.print(f"wrote {path}")
+    return None
 
 
 def convert(

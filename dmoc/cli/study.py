@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from dmoc.cli.options import Json, Name, Settings, ends_at_once, switch, transfer_of, writable
+from dmoc.cli.options import Json, Name, Settings, ends_at_once, not_a_team, switch, writable
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -59,10 +59,11 @@ def study(
     chosen, meshes = whole_numbers("orders", orders), None if steps is None else whole_numbers("steps", steps)
     live = report.console(stderr=True).status("") if sys.stderr.isatty() and not as_json else None
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
-        problem = transfer_of(name, settings, "study")
+        problem = not_a_team(name, settings, "study")
         methods = {} if against is None else load_methods(against)
         told = live.update if live else None
-        trials = work_precision(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
+        measured = _of_mission if hasattr(problem, "plan") else work_precision
+        trials = measured(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
         save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time")
     if csv is not None:
@@ -77,6 +78,17 @@ def study(
     console.print(report_study.study_tables(trials, unit, console.width))
     for path in filter(None, (plot, csv)):
         console.print(f"wrote {path}")
+
+
+def _of_mission(
+    mission: Any, orders: Any, steps: Any, repeats: int, methods: dict, reference: Any, cold: bool, *rest: Any
+) -> list:
+    """The trials of a mission, which no other method solves, and which has no coarse meshes on the way."""
+    from dmoc.studies.of_missions import mission_precision
+
+    if cold or methods:
+        raise ValueError("--cold and --against are for transfers; a mission of legs has neither")
+    return mission_precision(mission, orders, steps, repeats, reference, *rest)
 
 
 def whole_numbers(name: str, text: str) -> list[int]:

@@ -121,17 +121,31 @@ def mission_cause(
             if not needs:
                 needs = [" and ".join(filter(None, (limit.told(_roomy(joint.slack[0])) for limit in limits)))]
             return None, f"a path near the guess needs {', or '.join(needs)}"
-    return _rows(elastic, paths[0])
+    near, words = _rows(elastic, paths[0])
+    return (near, words) if near is not None or not words else (None, _zones(elastic, paths) or words)
+
+
+def _zones(elastic: Elastic, paths: Sequence) -> str:
+    """The zones of legs that would be enough if they gave way, each alone; empty if none is."""
+    program, needs = elastic.program, []
+    for limit in _of_legs(program, paths[0], zones=True)[:MOST_ALONE]:
+        alone = elastic.relaxed(limit)(program.mission, paths[0])
+        if alone.feasible and alone.slack[0] > MET and (words := limit.told(alone.slack[0])):
+            needs.append(words)
+    return f"a path near the guess needs {', or '.join(needs)}" if needs else ""
 
 
 def _roomy(slack: float) -> float:
     return (1 + float(slack)) * (1 + ROOM) - 1
 
 
-def _of_legs(program: Any, path: Any) -> list[Yielding]:
+def _of_legs(program: Any, path: Any, zones: bool = False) -> list[Yielding]:
+    """What gives way in each leg: what more time eases, or its zones."""
     found, bounds = [], program.bounds()
     for name, placed, leg in zip(program.mission.leg_names, program.legs, path.legs, strict=True):
-        for limit in _Leg(placed, leg, bounds).limits():
+        mine = _Leg(placed, leg, bounds)
+        each = [mine.zone(entry, leg) for entry in mine.zones()] if zones else mine.limits()
+        for limit in filter(None, each):
             words = _in_leg(limit.told, name)
             rows, columns = placed.rows + limit.rows, placed.columns + limit.columns
             found.append(Yielding(words, rows, limit.signs, columns, limit.below, limit.above))
@@ -200,5 +214,37 @@ def _rows(elastic: Elastic, path: Any) -> tuple[Any, str]:
     if miss.max() <= MET:
         return found.path, ""
     worst = [int(i) for i in np.argsort(-miss)[:MOST_NAMED] if miss[i] > NAMED_SHARE * miss.max()]
-    names = [elastic.program.name_of(place, False) for place in worst]
-    return None, f"these rows cannot be met together: {', '.join(names)}"
+    told = dict.fromkeys(_missed(elastic.program, place, float(miss[place])) for place in worst)
+    return None, f"{_unsteered(elastic.program)}not all that is asked can hold together: {'; '.join(told)}"
+
+
+def _unsteered(program: Any) -> str:
+    """The legs without controls, in words."""
+    names = zip(program.mission.leg_names, program.legs, strict=True)
+    coasts = [name for name, leg in names if not leg.program.problem.controls]
+    return f"{' and '.join(coasts)} cannot be steered, and " if coasts else ""
+
+
+def _missed(program: Any, place: int, miss: float) -> str:
+    """A row that is missed, in words, and by how much [SI]."""
+    for name, placed in zip(program.mission.leg_names, program.legs, strict=True):
+        at = place - placed.rows
+        if 0 <= at < placed.program.rows.size:
+            return f"in {name} {_missed_in_leg(placed, at, miss)}"
+    at = place - program.first_row
+    group = program.rows.group_at(at)
+    component = (at - group.start) % len(group.labels)
+    size, unit = miss / float(group.scales[0, component]), group.units[component]
+    label = group.labels[component].removeprefix(f"{group.name}.").replace("_", " ").replace(".", " ")
+    where = {"start": "at the start", "goal": "at the goal", "mission": "of the mission"}
+    return f"the {label} {where.get(group.name, f'at {group.name}')} is missed by {size:.3g} {unit}".rstrip()
+
+
+def _missed_in_leg(placed: Any, at: int, miss: float) -> str:
+    layout, problem = placed.program.rows, placed.program.problem
+    group = layout.group_at(at)
+    if group.owner is not None and group.owner.field == "constraints":
+        return f"the body cannot be one that {group.owner.of(problem).words()}"
+    if group.name == "dynamics":
+        return "the motion that follows from the forces does not lead where it must"
+    return f"{layout.name_of(at)} does not hold"

@@ -140,10 +140,15 @@ def _falls_past(problem: TransferProblem, mesh: np.ndarray) -> bool:
     return problem.limited and several and not problem.free_duration and lengths.max() > UNEVEN * lengths.min()
 
 
+def _comes_to_zero(engine: Any) -> bool:
+    """Whether a thrust may be none: where it never is, a barrier that may rise takes twice as long."""
+    return getattr(engine, "min_thrust", 0.0) != engine.force_limit()
+
+
 def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, Any]:
     """Options for the barrier parameter, where it is better that it may also rise; none elsewhere."""
     rounded = problem.actuator.smoothing is not None
-    if rounded and problem.objective.metered:
+    if rounded and problem.objective.metered and _comes_to_zero(problem.actuator):
         # With |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations.
         settings: dict[str, Any] = {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
         # Near the optimum full steps can go to and fro, 2,700 times in one case, each for hardly less violation

@@ -46,6 +46,10 @@ class Event(Duties):
     pushes: ClassVar[bool] = False
     # Whether the energy per mass is the same before and behind it.
     keeps_energy: ClassVar[bool] = False
+    # The controls that go on over it without a jump, and whether their limits there are left to the leg behind
+    # it, not to the one before.
+    continued: tuple[int, ...] = ()
+    left_behind: bool = False
 
     def unknowns(self, axes: int) -> tuple[tuple[str, str], ...]:
         """Name and unit of each unknown of its own, in a space of so many axes."""

@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.chains.path import MissionPath, kicks_of
+from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.iterate import SEEN, in_units
 from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
 from dmoc.ipopt.run import STATUSES, Answer
-from dmoc.missions.path import MissionPath, kicks_of
-from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import Kick, MissionSolution
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, part_solution

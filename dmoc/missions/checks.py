@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import MissionPath
+from dmoc.chains.program import MissionProgram
 from dmoc.checks.evidence import Evidence
 from dmoc.checks.optimality import idle, left_over
 from dmoc.checks.primer import primer_check
 from dmoc.checks.verification import CHECKS, Check, Report, not_finite, own_checks, refuse_twins
 from dmoc.checks.worst import fastest, worst_of
 from dmoc.diagnosis.wrong_way import WORTH, share_of, told
-from dmoc.missions.path import MissionPath
-from dmoc.missions.program import MissionProgram
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.facts import optimality_limit
 

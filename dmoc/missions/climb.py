@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import MissionPath, cold
+from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Answer, Interrupt, Watch
 from dmoc.missions.answer import answered, straightened
-from dmoc.missions.guess import ORDER, STEPS, guessed, meshes_along
-from dmoc.missions.path import MissionPath, cold
-from dmoc.missions.program import MissionProgram
+from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import local_errors
@@ -35,6 +34,8 @@ MOST_TRYING = 200
 ACCURATE, MOST_MENDED = 1e-5, 3
 # Near to the answer Ipopt is asked for this [-]: at limits the barrier leaves an error of that size.
 SHARP = 1e-12
+# There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
+STAYING = 1.0
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -67,6 +68,8 @@ class Climb:
 
     # What sees it as Ipopt does.
     program: Any = MissionProgram
+    # Whether all attempts are to be as sharp as those from nearly the answer.
+    sharp = False
 
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
@@ -96,8 +99,11 @@ class Climb:
         program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
+        if self.sharp:
+            limits["ipopt.tol"] = SHARP
         if near is not None:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
+            limits["ipopt.theta_max_fact"] = STAYING
         built = time.perf_counter() - begun
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
@@ -182,15 +188,19 @@ class Climb:
         return again if again.solved else attempt
 
     def refined(
-        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE
+        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE, still: float = np.inf
     ) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
 
-        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum.
+        Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
+        by about the part `still` of it.
         """
-        error, changes, errors = None, [], self._errors(attempt)
-        for _ in range(MOST_MENDED if tol is None else MOST_MESHES):
-            if tol is None and _largest(errors) <= accurate:
+        error, errors = None, self._errors(attempt)
+        changes: list[float] = []
+        few = tol is None and np.isinf(still)
+        for _ in range(MOST_MENDED if few else MOST_MESHES):
+            rest = _left(changes) if changes else 0.0
+            if tol is None and _largest(errors) <= accurate and rest <= still:
                 break
             onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
@@ -260,20 +270,6 @@ def solve_mission(
         if steps is not None and tol is None:
             return answered(climb, first)
         return answered(climb, *climb.refined(first, tol), tol)
-
-
-def first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
-    """The path to start from, on its first meshes."""
-    given = mission.guess if guess is None else guess
-    given = getattr(given, "path", given)
-    if isinstance(given, MissionPath) and not given.suits(mission):
-        given = given.as_arrays()
-    if isinstance(given, MissionPath):
-        return given.onto(meshes_along(mission, given, order, steps)) if order or steps else given
-    orders = [leg.order or order or ORDER for leg in mission.plan]
-    counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
-    path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
-    return path.onto(meshes_along(mission, path, order, steps))
 
 
 def _largest(errors: list[np.ndarray]) -> float:

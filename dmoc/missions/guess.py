@@ -12,12 +12,12 @@ import numpy as np
 from dmoc.basics.arguments import both_ends, short
 from dmoc.basics.plain import unbroken
 from dmoc.basics.quaternions import in_one_sign, normalised
+from dmoc.chains.path import MissionPath
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
 from dmoc.missions.arcs import cheapest_arc
-from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -115,6 +115,8 @@ def _places(
     if given is not None:
         known, values = given
         return lambda times: np.stack([np.interp(times, known, column) for column in values.T], axis=1)
+    if mission.closes and (around := _around(mission, float(begins[0]), float(durations.sum()))) is not None:
+        return around
     knots = _known(mission, begins)
     found = []
     for (first, start), (last, goal) in pairwise(knots):
@@ -126,6 +128,22 @@ def _places(
     times = np.concatenate([part for part, _ in found])
     values = np.concatenate([part for _, part in found])
     return lambda at: np.stack([np.interp(at, times, column) for column in values.T], axis=1)
+
+
+def _around(mission: Mission, begin: float, period: float) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The circle around a lone attractor that closes in a time [s], for a closed path whose places are open."""
+    attractor, axes = mission.stretches[0].attraction.lone, mission.dimension
+    if attractor is None or axes < 2 or not np.isnan(mission.start.estimate(begin)[0]).all():
+        return None
+    center, rate = attractor.place(axes), 2 * np.pi / period
+    radius = (attractor.mu / rate**2) ** (1 / 3)
+
+    def places(times: np.ndarray) -> np.ndarray:
+        angles = rate * (times - begin)
+        flat = np.zeros((len(times), axes - 2))
+        return center + np.column_stack([radius * np.cos(angles), radius * np.sin(angles), flat])
+
+    return places
 
 
 def _known(mission: Mission, begins: np.ndarray) -> list[tuple[int, Any]]:
@@ -254,3 +272,17 @@ def mesh_around(
         mesh = np.interp(mesh, angles / angles[-1], fractions)
         mesh[0], mesh[-1] = 0.0, 1.0
     return mesh
+
+
+def first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:
+    """The path to start from, on its first meshes."""
+    given = mission.guess if guess is None else guess
+    given = getattr(given, "path", given)
+    if isinstance(given, MissionPath) and not given.suits(mission):
+        given = given.as_arrays()
+    if isinstance(given, MissionPath):
+        return given.onto(meshes_along(mission, given, order, steps)) if order or steps else given
+    orders = [leg.order or order or ORDER for leg in mission.plan]
+    counts = [leg.steps or steps or STEPS[each] for leg, each in zip(mission.plan, orders, strict=True)]
+    path = guessed(mission, list(zip(map(uniform_mesh, counts), orders, strict=True)), hold, given)
+    return path.onto(meshes_along(mission, path, order, steps))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.missions.path import MissionPath
+from dmoc.chains.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import (
     Format,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -238,6 +239,17 @@ class Actuator(Duties):
     def violation(self, value: float, unit: str) -> tuple[float, str]:
         """Size and unit of a row's violation for a person; `value` is its size in the row's own `unit`."""
         return value * (self.force_limit() or 1.0), "N"
+
+    def limit_names(self, dimension: int) -> tuple[tuple[str, str], ...]:
+        """What it does at the lower and the upper side of each of its limits, "" where there is none.
+
+        Empty for an actuator that cannot be told to keep to a limit; see `kept`.
+        """
+        return ()
+
+    def kept(self, sides: Sequence[int]) -> Actuator:
+        """The actuator that keeps exactly to some `limit_names`: -1 the lower one, 1 the upper, 0 none."""
+        raise ValueError(f"{type(self).__name__} has no limits to keep to")
 
     def beyond(self, u: np.ndarray) -> np.ndarray:
         """By how much controls between nodes are beyond what it can do [N], shape (count,).

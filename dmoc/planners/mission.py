@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.climb import first_path
-from dmoc.missions.path import MissionPath
-from dmoc.missions.program import MissionProgram
+from dmoc.chains.path import MissionPath
+from dmoc.chains.program import MissionProgram
+from dmoc.missions.guess import first_path
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Group

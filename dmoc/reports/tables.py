@@ -45,6 +45,8 @@ def influence_table(rows: Sequence[Influence], solution: Solution) -> Renderable
         f"{solution.steps} steps). The goal moves between two flights of the same controls by an independent "
         "integrator, with the effect and without it. Time is that of all derivatives on the whole mesh."
     )
+    if len(getattr(solution, "legs", ())) > 1:
+        note += " Each leg is flown by itself from its own start; its end is what moves."
     if not all(row.listed for row in rows):
         note += " Effects in brackets are not in the scene: what they would do and cost."
     return Group(table, Text(note)) if rows else Text("The scene has no effect: there is nothing to leave out.")

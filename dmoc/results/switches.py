@@ -47,6 +47,13 @@ def has_linear_controls(problem: TransferProblem) -> bool:
     return bool(_linear(problem, problem.controls).any())
 
 
+def linear_controls(problem: TransferProblem) -> np.ndarray:
+    """Which controls the cost is linear in, whether or not each has limits of its own."""
+    u = ca.SX.sym("u", problem.controls)
+    curved = ca.sum2(ca.hessian(_rate(problem, u), u)[0])
+    return np.array([not curved.sparsity().has_nz(i, 0) for i in range(problem.controls)])
+
+
 def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """When a control that the cost is linear in passes the middle between its limits [s]."""
     fractions = 0.5 * (path.mesh[1:] + path.mesh[:-1]) if path.hold else path.fractions
@@ -89,8 +96,12 @@ def _linear(problem: TransferProblem, size: int) -> np.ndarray:
     if not limited.any():
         return limited
     u = ca.SX.sym("u", size)
-    rate = ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
-    return limited & (ca.hessian(rate, u)[0].nnz() == 0)
+    return limited & (ca.hessian(_rate(problem, u), u)[0].nnz() == 0)
+
+
+def _rate(problem: TransferProblem, u: ca.SX) -> ca.SX:
+    """What the objective integrates, as an expression of the controls."""
+    return ca.SX(problem.objective.rate(problem.actuator, *state_symbols(problem.dimension)[:3], u, 1.0))
 
 
 def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> np.ndarray:

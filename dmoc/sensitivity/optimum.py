@@ -75,7 +75,7 @@ class Optimum:
 
     @classmethod
     def _of_mission(cls, solution: Any, mission: Any) -> Optimum:
-        from dmoc.missions.program import MissionProgram
+        from dmoc.chains.program import MissionProgram
         from dmoc.planners.mission import MissionPlanner, identifiers
 
         path, names = solution.path, identifiers(mission.leg_names)

@@ -11,14 +11,11 @@ from dmoc.motion.path import DiscretePath
 from dmoc.results.solution import Solution
 from dmoc.results.switches import control_shares
 from dmoc.scene.problem import TransferProblem
+from dmoc.structure.modes import FREE, INSIDE, SINGULAR_NODES, kinds_along, names_of, runs_of, switch
 from dmoc.structure.surfaces import Surface, touched
 
 # What the controls do in an arc.
-BURN, COAST, SINGULAR, FREE = "burn", "coast", "singular arc", "arc"
-# A control is between its limits if it is further from them than this part of its span [-].
-INSIDE = 0.02
-# So many nodes in a row between the limits are a singular arc: a switch takes one or two.
-SINGULAR_NODES = 5
+BURN, COAST, SINGULAR = "burn", "coast", "singular arc"
 # A limit acts if loosening it by its own size would change the objective by this part of it [-].
 ACTS = 1e-5
 # A path follows a limit if that acts over more than this many steps; else it touches it.
@@ -28,7 +25,8 @@ FOLLOWED_STEPS = 2.5
 class Arc(NamedTuple):
     """A part of a path: what the controls do, where it ends, what it follows, what it touches at its end.
 
-    `end` is a fraction of the whole duration.
+    `kind` is one of the words above or says to which limits controls keep; `end` is a fraction of the whole
+    duration.
     """
 
     kind: str
@@ -55,7 +53,7 @@ def is_switched(problem: TransferProblem) -> bool:
 def arcs_of(solution: Solution) -> tuple[Arc, ...]:
     """The arcs of an answer on a coarse mesh."""
     problem, path = solution.require_problem(), solution.path
-    cuts = _switches(problem, path) if is_switched(problem) else [(FREE, 1.0)]
+    cuts = _switches(problem, path) if is_switched(problem) else _limits_kept(solution)
     marks: list[tuple[float, float, Surface]] = []
     for surface, acts in touched(problem, path, ACTS * abs(solution.objective)).items():
         marks += [(*span, surface) for span in spans_of(path, acts)]
@@ -81,6 +79,19 @@ def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, f
     return [*found, (str(kinds[-1]), 1.0)]
 
 
+def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
+    """The limits that controls keep to and the fractions at which that changes."""
+    problem, path = solution.require_problem(), solution.path
+    if not names_of(problem):
+        return [(FREE, 1.0)]
+    kinds, at = kinds_along(problem, path, ACTS * abs(solution.objective)), path.fractions
+    found = []
+    for node in runs_of(kinds):
+        part = switch(problem, path, node)
+        found.append((str(kinds[node]), float(at[node] + part * (at[node + 1] - at[node]))))
+    return [*found, (str(kinds[-1]), 1.0)]
+
+
 def spans_of(path: DiscretePath, acts: np.ndarray) -> list[tuple[float, float]]:
     """First and last fraction of each run of nodes; gaps within a step do not part a run."""
     at, steps = path.fractions, path.order // 2
@@ -94,7 +105,8 @@ def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) 
     places: list[tuple[float, Surface | None]] = [(end, None) for _, end in cuts]
     follows: list[tuple[float, float, Surface]] = []
     for first, last, surface in marks:
-        if last - first > FOLLOWED_STEPS * step:
+        # Nothing keeps a coast at a limit: what looks like that is a touch.
+        if last - first > FOLLOWED_STEPS * step and COAST not in _kinds_within(cuts, first, last):
             follows.append((first, last, surface))
             places += [(first, surface), (last, surface)]
         else:
@@ -107,6 +119,12 @@ def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) 
         arcs.append(Arc(kind, end, along, touch))
         begin = end
     return tuple(arcs)
+
+
+def _kinds_within(cuts: list[tuple[str, float]], first: float, last: float) -> set[str]:
+    """The kinds of arcs between two fractions of the duration."""
+    begins = [0.0, *(end for _, end in cuts)]
+    return {kind for (kind, end), begin in zip(cuts, begins, strict=False) if begin < last and end > first}
 
 
 def alike(one: Sequence[Arc], other: Sequence[Arc]) -> bool:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.numerics import cubic_spline
+from dmoc.chains.path import MissionPath
 from dmoc.legs.legs import Coast, Leg
 from dmoc.missions.guess import mesh_around
-from dmoc.missions.path import MissionPath
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
@@ -19,6 +19,7 @@ from dmoc.results.solution import Solution
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
+from dmoc.structure.modes import are_rows, continued, controls_at_limits, is_linear, names_of, sides_of
 from dmoc.structure.surfaces import Followed, Tangent
 
 # Legs are found with this order: from a rough path Ipopt gets there far more often than at order 6 or 8.
@@ -42,6 +43,8 @@ def mission_of(problem: TransferProblem, arcs: Sequence[Arc]) -> Mission:
         parts.append(_leg(problem, arc, i))
         if arc.touches is not None:
             parts.append(Tangent(problem.constraints[arc.touches.constraint], arc.touches))
+        elif i + 1 < len(arcs):
+            parts += continued(problem, arc.kind, arcs[i + 1].kind)
     return Mission(
         mass=problem.mass,
         start=problem.start,
@@ -72,7 +75,11 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
     degree = SINGULAR_DEGREE if arc.kind == SINGULAR else None
-    return Leg(constraints=constraints, name=name, control_degree=degree)
+    sides = sides_of(problem, arc.kind)
+    kept = problem.actuator.kept(sides) if any(sides) else None
+    if names_of(problem) and not are_rows(problem) and (is_linear(problem) & (np.array(sides) == 0)).any():
+        degree = SINGULAR_DEGREE
+    return Leg(constraints=constraints, name=name, actuator=kept, control_degree=degree)
 
 
 @dataclass(frozen=True)
@@ -135,13 +142,13 @@ class Course:
         if kind == COAST:
             return np.zeros((len(at), 0))
         control = np.stack([np.interp(at, self.times, column) for column in self.control.T], axis=1)
+        primer = np.stack([np.interp(at, self.times, column) for column in self.costate.T], axis=1)
         if kind != BURN:
-            return control
+            return controls_at_limits(problem, kind, control, primer)
         upper = problem.actuator.bounds(problem.dimension)[1]
         if problem.actuator.smoothing is None:
             return np.broadcast_to(upper, control.shape).copy()
         # A thrust of least cost is against the costate, also where the coarse answer coasts.
-        primer = np.stack([np.interp(at, self.times, column) for column in self.costate.T], axis=1)
         primer = -primer / np.maximum(np.linalg.norm(primer, axis=1), 1e-300)[:, None]
         return np.hstack([upper[-1] * primer, np.full((len(at), 1), upper[-1])])
 

@@ -222,7 +222,11 @@ def _by_structure(
             "with structure=True forces are not held and meshes are chosen: give neither hold nor mesh"
         )
     more = dict(zip(("options", "progress", "compiled", "time_limit"), rest, strict=True))
-    return solve_by_structure(problem, order, steps, tol, guess=guess, **more)
+
+    def otherwise() -> Solution:
+        return transfer_solver.solve(problem, order, steps, tol, False, None, guess, *rest)
+
+    return solve_by_structure(problem, order, steps, tol, otherwise, guess=guess, **more)
 
 
 def verify(

@@ -11,6 +11,7 @@ from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, spans_of
+from dmoc.structure.modes import lacking, names_of
 from dmoc.structure.surfaces import NEAR, pierced, room, touched
 
 # A leg is empty if it lasts less than this many times its shortest duration.
@@ -19,6 +20,8 @@ EMPTY = 1.5
 WRONG = 1e-6
 # It is in doubt up to this many times what it is at a switch, where it should be zero [-].
 DOUBT = 10.0
+# An arc between two touches of a limit is at it throughout if it is within this part of all the room [-].
+SAME = 1e-5
 # A new arc begins with this part of the whole duration on either side of where that is furthest wrong [-]: a
 # longer one leads away from the answer so far.
 NEW = 1e-3
@@ -31,6 +34,9 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
         return less
     if (along := _followed(problem, arcs, found)) != arcs:
         return along
+    other = None if is_switched(problem) else _other_limits(problem, arcs, found)
+    if other is not None:
+        return other
     more: list[Arc] = []
     missing = [_wrong(arcs, i, leg) for i, leg in enumerate(found.legs)] if is_switched(problem) else []
     # At both of its switches the function of a leg is zero, but for the errors of its steps.
@@ -48,6 +54,23 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
             parts = _touching(problem, arc, leg, found.objective)
         more += [part._replace(end=begin + (arc.end - begin) * part.end) for part in parts] or [arc]
     return tuple(more)
+
+
+def _other_limits(
+    problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSolution
+) -> tuple[Arc, ...] | None:
+    """The arcs with one more, in which controls keep to other limits, or None where none lacks."""
+    if not names_of(problem):
+        return None
+    least = ACTS * abs(found.objective)
+    lacks = lacking(problem, [arc.kind for arc in arcs], [leg.path for leg in found.legs], least)
+    if lacks is None:
+        return None
+    index, kind, wrong = lacks
+    begin = arcs[index - 1].end if index else 0.0
+    parts = _parted(arcs, index, found, wrong, kind)
+    scaled = [part._replace(end=begin + (arcs[index].end - begin) * part.end) for part in parts]
+    return (*arcs[:index], *scaled, *arcs[index + 1 :])
 
 
 def settled(arcs: Sequence[Arc], found: MissionSolution) -> tuple[Arc, ...]:
@@ -83,7 +106,10 @@ def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSol
             rooms = [
                 room(problem, leg.path, surface, leg.path.fractions, leg.path.position) for leg in found.legs
             ]
-            if np.abs(rooms[i + 1]).max() < NEAR * np.ptp(np.concatenate(rooms)):
+            most, whole = float(np.abs(rooms[i + 1]).max()), float(np.ptp(np.concatenate(rooms)))
+            leg = found.legs[i + 1]
+            broken = any(one == surface for _, one in pierced(problem, leg.path, leg.provenance.start_time))
+            if most < SAME * whole or (broken and most < NEAR * whole):
                 left[i + 1] = two._replace(follows=surface)
     if tuple(left) == arcs:
         return arcs
@@ -121,15 +147,18 @@ def _wrong(arcs: tuple[Arc, ...], index: int, leg: Solution) -> np.ndarray:
     return switching * (1 if arcs[index].kind == BURN else -1) * path.mass[0] / length.max()
 
 
-def _parted(arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray) -> list[Arc]:
-    """A burn with a coast in it, or a coast with a burn, where the switching function is furthest wrong."""
+def _parted(
+    arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray, kind: str = ""
+) -> list[Arc]:
+    """An arc with one of another kind in it where it is furthest wrong: a burn with a coast, or the reverse."""
     arc, leg, peak = arcs[index], found.legs[index], int(np.argmax(wrong))
     at = leg.path.fractions
     right = np.flatnonzero(wrong == 0.0)
     first, last = int(right[right < peak].max(initial=0)), int(right[right > peak].min(initial=len(at) - 1))
     share = NEW * found.duration / leg.duration
     begin, end = max(at[first], at[peak] - share), min(at[last], at[peak] + share)
-    other = arc._replace(kind=COAST if arc.kind == BURN else BURN, end=end, touches=None)
+    kind = kind or (COAST if arc.kind == BURN else BURN)
+    other = arc._replace(kind=kind, end=end, touches=None)
     before = [] if peak == 0 else [arc._replace(end=begin, touches=None)]
     if peak == len(at) - 1:
         return [*before, other._replace(end=1.0, touches=arc.touches)]

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from dmoc.chains.path import MissionPath, merged
 from dmoc.checks.primer import HELPS, worth_of
-from dmoc.missions.path import MissionPath, merged
 from dmoc.missions.solution import MissionSolution
 from dmoc.scene.impulses import FEWER, MORE, with_impulse, without_impulse
 from dmoc.scene.mission import Mission

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,12 +23,15 @@ from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
+from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
 # |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer.
 ROUNDED = 1e-3
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
 COARSE_STEPS = {2: 60, 4: 30}
+# A second coarse answer has so many times the steps.
+FINER = 3
 # Over more revolutions than this there are too many arcs.
 MOST_TURNS = 10
 # Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that
@@ -44,9 +47,15 @@ NEAR = (1e-9, 1e-6), (1e-4, 1e-2)
 # An answer that costs more than the coarse one by over this part of it [-] is another optimum, or none.
 WORSE = 0.1
 # An attempt from nearly the answer ends after this many iterations.
-MOST_ITERATIONS = 200
+MOST_ITERATIONS = 100
+# Finding the legs takes at most this much work, iterations times steps, beside so many times that of the coarse
+# answer: about two seconds. Where they are not found by then the ordinary ladder goes on.
+MOST_WORK, MOST_TIMES = 20_000, 2
 # Without a tolerance, legs are refined until their steps err by less than this part of the path [-].
 ACCURATE = 1e-9
+# Nor may the objective change by more than this part of it [-]: what steps err by says nothing of how well the
+# controls follow a fast turn of the thrust.
+STILL = 1e-8
 
 
 @unchanged()
@@ -55,11 +64,13 @@ def solve_by_structure(
     order: int | None = None,
     steps: int | None = None,
     tol: float | None = None,
+    otherwise: Callable[[], Solution] | None = None,
     **more: Any,
 ) -> Solution | MissionSolution | None:
     """The answer as a mission of arcs; None where that does not succeed.
 
-    `order` and `steps` are those of the coarse answer, `more` are further arguments of `dmoc.solve`. The
+    `order` and `steps` are those of the coarse answer, `otherwise` gives the one of the ordinary ladder, which
+    is asked for where the coarse one costs far less; `more` are further arguments of `dmoc.solve`. The
     independent checks judge the result. What was found when the user or the time ended it is told as it is.
     """
     check_numerics(order, steps, tol, False, more.get("options"), more.get("progress"), more.get("time_limit"))
@@ -68,18 +79,48 @@ def solve_by_structure(
     coarse = coarse_answer(problem, order, steps, **more)
     if not coarse.success:
         return coarse if coarse.status in ENDED else None
+    found = _by_arcs(problem, coarse, tol, more)
+    if (found is None or _is_dear(found, coarse)) and order is None and steps is None:
+        if len(arcs_of(coarse)) == 1:
+            return found
+        # Where a burn is hardly longer than a step the arcs are seen on a finer mesh.
+        finer = coarse_answer(problem, coarse.order, FINER * coarse.steps, **more)
+        if finer.status in ENDED:
+            return finer
+        found = (_by_arcs(problem, finer, tol, more) if finer.success else None) or found
+    if found is None or not _is_dear(found, coarse):
+        return found
+    return None if otherwise is None else _better(found, otherwise())
+
+
+def _is_dear(found: MissionSolution, coarse: Solution) -> bool:
+    """Whether an answer costs so much more than the coarse one that another optimum may be better."""
+    sense = coarse.require_problem().objective.sense
+    return found.optimal and sense * (found.objective - coarse.objective) > WORSE * abs(coarse.objective)
+
+
+def _better(found: MissionSolution, other: Solution) -> MissionSolution | Solution:
+    """The one of two answers to stay with: the other one where that is an optimum and costs less."""
+    sense = found.require_problem().objective.sense
+    return other if other.optimal and sense * (found.objective - other.objective) > 0 else found
+
+
+def _by_arcs(
+    problem: TransferProblem, coarse: Solution, tol: float | None, more: dict[str, Any]
+) -> MissionSolution | None:
+    """The answer as a mission of the arcs of a coarse one."""
     arcs, legs = arcs_of(coarse), (coarse,)
-    if len(arcs) == 1:
+    if len(arcs) == 1 and arcs[0].alike == (FREE, None):
         return None
     numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
     climb = Climb(mission_of(problem, arcs), *numerics)
+    climb.sharp = True
     climb.levels.extend(coarse.ladder)
     with climb.interrupt:
         found = _improved(climb, problem, arcs, legs, tol)
     if found is None or found.status in ENDED:
         return found
-    worse = problem.objective.sense * (found.objective - coarse.objective) > WORSE * abs(coarse.objective)
-    return found if found.optimal and not worse and _is_settled(found) and verdict(found).ok else None
+    return found if found.optimal and _is_settled(found) and verdict(found).ok else None
 
 
 def _is_settled(found: MissionSolution) -> bool:
@@ -124,7 +165,7 @@ def coarse_answer(problem: TransferProblem, order: int | None, steps: int | None
 def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
     """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
     lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
-    return f"{len(arcs)} legs: {', '.join(lengths)}"
+    return f"{len(arcs)} leg{'s' * (len(arcs) > 1)}: {', '.join(lengths)}"
 
 
 def verdict(found: MissionSolution) -> Report:
@@ -136,27 +177,41 @@ def _improved(
     climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution], tol: float | None
 ) -> MissionSolution | None:
     """The arcs of an answer on fine meshes, once no mesh shows that one is missing or in vain."""
+    spent = _work(climb)
+    most = MOST_WORK + MOST_TIMES * spent
     for _ in range(MOST_ROUNDS):
-        settled = _settled(climb, problem, arcs, legs)
+        settled = _settled(climb, problem, arcs, legs, spent + most)
         if settled is None:
             return None
         known, attempt = settled
-        found = _finished(climb, problem, attempt, tol) if attempt.solved else answered(climb, attempt)
-        # What meshes of low order do not show may be seen now.
+        found = answered(climb, attempt)
+        if attempt.solved:
+            attempt = _of_high_order(climb, problem, attempt, tol)
+            found = answered(climb, attempt)
+            # What meshes of low order do not show may be seen now, and is, before they are refined.
+            if alike(improved(problem, known, found), known):
+                found = answered(climb, *climb.refined(attempt, tol, ACCURATE, STILL), tol)
         arcs, legs = improved(problem, known, found) if found.optimal else known, found.legs
         if alike(arcs, known):
             return structured(found, arcs=plain(arcs), reason=told(arcs, found))
     return None
 
 
+def _work(climb: Climb) -> int:
+    """Iterations times steps so far, which take about equally long."""
+    return sum(level.iterations * level.steps for level in climb.levels)
+
+
 def _settled(
-    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution]
+    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution], most: int
 ) -> tuple[tuple[Arc, ...], Attempt] | None:
-    """The arcs that neither lack one nor have one in vain, and their answer."""
+    """The arcs that neither lack one nor have one in vain, and their answer, within so much work."""
     for _ in range(MOST_ROUNDS):
         climb.mission = mission_of(problem, arcs)
         path = path_of(problem, arcs, legs)
         for near in NEAR:
+            if _work(climb) > most:
+                return None
             attempt = climb.attempt(path, most=MOST_ITERATIONS, near=near)
             if attempt.solved or attempt.answer.status == "stopped":
                 break
@@ -172,14 +227,13 @@ def _settled(
     return None
 
 
-def _finished(climb: Climb, problem: TransferProblem, attempt: Attempt, tol: float | None) -> MissionSolution:
-    """The answer on meshes of high order that are fine enough."""
-    wanted = ACCURATE if tol is None else tol
-    if climb.largest_error(attempt) > wanted:
-        course = Course.of(answered(climb, attempt).legs)
-        path = attempt.path
-        spans = [(begin, begin + leg.duration) for begin, leg in zip(path.begins, path.legs, strict=True)]
-        onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
-        finer = climb.attempt(onto, carried=True)
-        attempt = finer if finer.solved else attempt
-    return answered(climb, *climb.refined(attempt, tol, ACCURATE), tol)
+def _of_high_order(climb: Climb, problem: TransferProblem, attempt: Attempt, tol: float | None) -> Attempt:
+    """The answer on meshes of high order, where those it was found on are not fine enough."""
+    if climb.largest_error(attempt) <= (ACCURATE if tol is None else tol):
+        return attempt
+    course = Course.of(answered(climb, attempt).legs)
+    path = attempt.path
+    spans = [(begin, begin + leg.duration) for begin, leg in zip(path.begins, path.legs, strict=True)]
+    onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
+    finer = climb.attempt(onto, carried=True, most=2 * MOST_ITERATIONS)
+    return finer if finer.solved else attempt

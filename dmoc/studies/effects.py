@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from dmoc.motion.reference import apart, reference
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
-from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 
 # Derivatives are evaluated this many times, of which the fastest counts: whatever else the computer does makes
@@ -86,16 +86,43 @@ class Influence:
     turn: float = 0.0
 
 
-def influences(solution: Solution, others: bool = False) -> list[Influence]:
+def influences(solution: Any, others: bool = False) -> list[Influence]:
     """What each effect of a solved scene does and costs, and with `others` what the library's could do.
 
     The others are for scenes around the Earth in SI units: J2, Sun and Moon on circular orbits, air
-    and sunlight on 0.01 m^2 a kg.
+    and sunlight on 0.01 m^2 a kg. Of a mission an effect is told by the leg whose end it moves most; what it
+    costs is that of all legs.
     """
+    if hasattr(solution, "legs"):
+        return _of_legs(solution, others)
     problem, path = solution.require_problem(), solution.path
     found = [_influence(problem, path, effect, _name(effect), listed=True) for effect in problem.effects]
     missing = candidates(problem) if others else {}
     return found + [_influence(problem, path, effect, name, listed=False) for name, effect in missing.items()]
+
+
+def _of_legs(solution: Any, others: bool) -> list[Influence]:
+    """What each effect of a mission does in the leg where that is most, and costs in all of them."""
+    rows = [
+        (row, name, leg.steps)
+        for leg, name in zip(solution.legs, solution.require_problem().leg_names, strict=True)
+        for row in influences(leg, others)
+    ]
+    total, found = sum(leg.steps for leg in solution.legs), []
+    for effect, listed in dict.fromkeys((row.name, row.listed) for row, _, _ in rows):
+        mine = [each for each in rows if (each[0].name, each[0].listed) == (effect, listed)]
+        most, where, _ = max(mine, key=lambda each: (each[0].displacement, each[0].turn))
+        found.append(
+            replace(
+                most,
+                name=f"{effect}, most in {where}" if len(solution.legs) > 1 else effect,
+                acceleration=max(row.acceleration for row, _, _ in mine),
+                angular_acceleration=max(row.angular_acceleration for row, _, _ in mine),
+                instructions=sum(row.instructions for row, _, _ in mine),
+                time_share=sum(row.time_share * steps for row, _, steps in mine) / total,
+            )
+        )
+    return sorted(found, key=lambda row: not row.listed)
 
 
 def candidates(problem: TransferProblem) -> dict[str, Effect]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.arguments import short
 from dmoc.motion import march
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from dmoc.legs.legs import Joint
     from dmoc.missions.solution import MissionSolution
     from dmoc.scene.mission import Mission
+    from dmoc.scene.team import Team
 
 
 @wraps(march.simulate)
@@ -26,8 +28,7 @@ def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Tr
     problem = getattr(problem, "alone", None) or problem
     if hasattr(problem, "together"):
         raise ValueError(
-            "a team of bodies cannot be simulated as a whole; simulate its members, each with its own "
-            "solution: dmoc.simulate(team.members[0], solution.members[0])"
+            "a team of bodies has a flight for each of them; use dmoc.simulate_team(team, solution)"
         )
     if hasattr(controls, "legs") and not hasattr(problem, "joints"):
         # The arcs of a transfer that was solved by its structure are the legs of a mission.
@@ -35,6 +36,33 @@ def simulate(problem: Any, controls: Any = None, *given: Any, **more: Any) -> Tr
     if not hasattr(problem, "joints"):
         return march.simulate(problem, controls, *given, **more)
     return flown_mission(problem, controls)
+
+
+def simulate_team(team: Team, solution: Any = None, *given: Any, **more: Any) -> dict[str, Trajectory]:
+    """The flights of all bodies of a team by their names, each marched forward as by `simulate`.
+
+    Parameters
+    ----------
+    team : Team
+    solution : TeamSolution, optional
+        Its controls are applied; without one all bodies coast, and `given` and `more` are further arguments of
+        `simulate`.
+
+    Raises
+    ------
+    ValueError
+        If it is no team, or the solution is not of this team.
+    """
+    if not hasattr(team, "together"):
+        raise ValueError(f"team must be a dmoc.Team; got {short(team)}")
+    if solution is None:
+        parts: Any = [None] * len(team.members)
+    elif hasattr(solution, "members"):
+        parts = solution.attach(team).members
+    else:
+        raise ValueError(f"solution must be a TeamSolution; got {short(solution)}")
+    flights = [march.simulate(one, mine, *given, **more) for one, mine in zip(team.members, parts, strict=True)]
+    return dict(zip(team.names, flights, strict=True))
 
 
 def flown_mission(mission: Mission, solution: Any) -> Trajectory:
@@ -76,8 +104,8 @@ def _flights(mission: Mission, solution: MissionSolution) -> Iterator[Trajectory
 
 def _behind(joint: Joint, solution: MissionSolution, dynamics: Dynamics, state: tuple) -> tuple:
     """Position, independent velocities and mass behind the events of a joint."""
+    from dmoc.chains.path import own_parts
     from dmoc.legs.events import Instant
-    from dmoc.missions.path import own_parts
 
     time, q, v, mass = state
     speeds = dynamics.configuration.coordinates.speeds

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.chains.path import MissionPath
 from dmoc.guess.open_ends import turned_around
 from dmoc.legs.legs import Leg
-from dmoc.missions.climb import OTHER_DURATIONS, Climb, first_path
-from dmoc.missions.guess import likely_durations
-from dmoc.missions.path import MissionPath
+from dmoc.missions.climb import OTHER_DURATIONS, Climb
+from dmoc.missions.guess import first_path, likely_durations
 from dmoc.scene.mission import Mission
 from dmoc.solver.starts import SAME_OBJECTIVE, Optimum
 

@@ -117,7 +117,7 @@ def unpack(text: str) -> Any:
             from dmoc.teams.path import TeamPath
 
             return TeamPath(legs, begins, **facts)
-        from dmoc.missions.path import MissionPath
+        from dmoc.chains.path import MissionPath
 
         return MissionPath(legs, begins, **facts)
     with np.load(io.BytesIO(base64.b64decode(text)), allow_pickle=False) as stored:

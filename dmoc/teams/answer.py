@@ -33,6 +33,8 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     team, program, answer = climb.mission, attempt.program, attempt.answer
     path, status, success = attempt.path, answer.status, attempt.solved
     message = "a local optimum" if success else climb.reason or STATUSES[status].advice
+    if success and (broken := _run_through(team, path)):
+        status, success, message = "infeasible", False, broken
     if success and not met:
         status, success = NOT_MET, False
         reached = "unknown" if error is None else f"{error.largest:.1e}"
@@ -98,9 +100,16 @@ def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
         other = "shorter" if bound == "shortest" else "longer"
         ends = f"the duration ends on its {bound} limit of {lasting(path.duration, 6)}"
         found.append(f"{ends}: a {other} one may cost less")
-    worst = max(
-        (cut for cut in team_cuts(team, path) if len(cut.steps)), key=lambda cut: cut.value, default=None
-    )
-    if worst is not None:
-        found.append(f"{worst.name} is broken by {worst.value:.3g} m: try another guess or a finer mesh")
     return (*found, *cautions_of(team))
+
+
+def _run_through(team: Team, path: TeamPath) -> str:
+    """What two bodies break between nodes by running through each other there, in words; empty if nothing."""
+    cuts = [cut for cut in team_cuts(team, path) if len(cut.steps)]
+    if not cuts:
+        return ""
+    worst = max(cuts, key=lambda cut: cut.value)
+    return (
+        f"{worst.name} is broken by {worst.value:.3g} m: no way was found on which they pass each other; give "
+        "them more room or time, keep less distance, or try another guess or a finer mesh"
+    )

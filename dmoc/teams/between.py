@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.missions.within import Placed
+from dmoc.chains.within import Placed
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.kernel import Kernel, kernel
 from dmoc.nlp.layout import Layout

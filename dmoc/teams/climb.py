@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import cold
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.guess import mesh_around
-from dmoc.missions.path import cold
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
 from dmoc.parts.objectives import Effort

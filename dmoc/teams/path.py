@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.missions.path import MissionPath, cut_in_two
+from dmoc.chains.path import MissionPath, cut_in_two
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.motion.path import DiscretePath

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import MissionPath
+from dmoc.chains.program import MissionProgram
+from dmoc.chains.within import Placed, leg_program
 from dmoc.ipopt.run import Answer
-from dmoc.missions.path import MissionPath
-from dmoc.missions.program import MissionProgram
-from dmoc.missions.within import Placed, leg_program
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem

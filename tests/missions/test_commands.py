@@ -89,9 +89,9 @@ def test_a_violation_is_told_in_the_size_of_its_unit():
     legs = [Leg(1.0, name="out"), Leg(1.0, name="back")]
     mission = Mission(2.0, State((0, 0), (0, 0)), State((1e6, 0), (0, 0)), legs)
     solution = solve(mission, order=2, steps=10)
+    from dmoc.chains.program import MissionProgram
     from dmoc.ipopt.run import Answer
     from dmoc.missions.answer import worst_rows
-    from dmoc.missions.program import MissionProgram
 
     program = MissionProgram.of(mission, mission.stretches, solution.path)
     x = program.pack(solution.path)

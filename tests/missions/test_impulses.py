@@ -10,10 +10,10 @@ import pytest
 
 import dmoc
 from dmoc import Coast, DeltaV, Impulse, Mission, Moving, PointGravity, State
+from dmoc.chains.path import merged
 from dmoc.legs.lambert import lambert
 from dmoc.missions.arcs import cheapest_arc
 from dmoc.missions.checks import primer_check
-from dmoc.missions.path import merged
 from dmoc.scene.problem_file import load_problem
 from dmoc.structure.pieces import cut
 

@@ -37,8 +37,8 @@ from dmoc import (
     rotation,
     three_body,
 )
+from dmoc.chains.program import MissionProgram
 from dmoc.missions.guess import guessed
-from dmoc.missions.program import MissionProgram
 from dmoc.motion.mesh import uniform_mesh
 
 # Velocity changes of Hohmann's transfer from radius 1 to radius 2 with mu = 1, and its duration.

@@ -27,6 +27,8 @@ from dmoc import (
 from dmoc.cli.app import main
 from dmoc.missions.guess import guessed
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.studies.effects import influences
+from dmoc.studies.of_missions import mission_precision
 from dmoc.studies.optima import mission_optima
 from dmoc.sweeps.data import read_sweep
 from dmoc.sweeps.journal import journal_of
@@ -216,11 +218,28 @@ def test_starts_from_the_command_line(planets, capsys):
     assert code == 0 and "Local optima found" in said.out and "default" in said.out
 
 
-def test_verbs_without_a_meaning_for_missions_say_so_in_one_line(planets, capsys):
-    for verb in ("effects", "study"):
-        code, said = run(capsys, verb, "planets.py")
-        assert code == 2 and said.err.startswith(f"error: dmoc {verb} takes a transfer, but planets.py is")
-        assert said.err.count("\n") == 1
+def test_what_an_effect_of_a_mission_does_is_told_by_the_leg_it_moves_most(planets, capsys):
+    code, said = run(capsys, "effects", "planets.py")
+    assert code == 0 and "PointGravity, mu 1 m^3/s^2" in said.out
+    legs = [Coast(0.3), Impulse(), Coast(2.0), Impulse()]
+    mission = replace(hohmann(), legs=[Impulse(), *legs], duration=(1, 60))
+    mission = replace(mission, legs=[Coast(0.3), *legs[1:3], Impulse()], goal=mission.start, duration=None)
+    (row,) = influences(solve(mission, order=4, steps=8))
+    assert row.name.endswith("most in coast 2") and row.listed
+    # Along the longer coast a straight line leaves the orbit further.
+    assert row.displacement > 1.0 and 0.9 < row.acceleration < 3.0
+
+
+def test_the_errors_of_a_mission_fall_with_the_order(planets, capsys):
+    trials = mission_precision(hohmann(), (4,), (8, 16), repeats=1)
+    assert [trial.nodes for trial in trials] == [17, 33]
+    assert np.log2(trials[0].error / trials[1].error) > 3.7
+    assert trials[0].path_error > 8 * trials[1].path_error
+    code, said = run(capsys, "study", "planets.py", "--orders", "4", "--steps", "6", "--repeats", "1", "--cold")
+    assert code == 2 and "a mission of legs has neither" in said.err
+
+
+def test_what_a_mission_needs_to_be_simulated_is_said_in_one_line(planets, capsys):
     code, said = run(capsys, "simulate", "planets.py")
     assert code == 2 and "--controls FILE" in said.err and said.err.count("\n") == 1
 

@@ -8,6 +8,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
+import dmoc
 from dmoc import (
     BallForce,
     CircularOrbit,
@@ -16,6 +17,7 @@ from dmoc import (
     Drop,
     Free,
     Impulse,
+    KeepOut,
     Leg,
     Mission,
     Periodic,
@@ -66,7 +68,7 @@ def test_rows_that_contradict_each_other_are_named_by_joint():
     legs = [Leg(1.0), Via((1, 1)), Via((1, 2)), Leg(1.0)]
     failed = solve(Mission(1.0, State((0, 0), (0, 0)), State((2, 0), (0, 0)), legs))
     assert not failed.success
-    assert "cannot be met together: joint 1.via" in failed.message
+    assert "the via 2 position y at joint 1 is missed by 1 m" in failed.message
 
 
 @pytest.mark.slow
@@ -110,3 +112,30 @@ def test_a_problem_file_must_not_return_a_class(tmp_path):
     file.write_text("from dmoc import Mission\n\n\ndef problem():\n    return Mission\n")
     with pytest.raises(ValueError, match=r"problem\(\) must return a dmoc\.TransferProblem"):
         load_problem(str(file)).make()
+
+
+def test_what_a_coast_cannot_meet_is_told_in_plain_words():
+    ends = State((0, 0), (1, 0)), State((10, 1), (1, 0))
+    failed = solve(Mission(1.0, *ends, [Coast(4.0), Coast(6.0)]))
+    assert not failed.success
+    assert failed.message.startswith(
+        "coast 1 and coast 2 cannot be steered, and not all that is asked can hold"
+    )
+    assert failed.message.endswith("the position y at the goal is missed by 1 m")
+
+
+def test_the_zone_in_the_way_of_a_coast_is_named():
+    ends = State((0, 0), (1, 0)), State((10, 0), (1, 0))
+    legs = [Coast(4.0), Leg(2.0, actuator=BallForce(1.0)), Coast(4.0)]
+    failed = solve(Mission(1.0, *ends, legs, constraints=[KeepOut((2, 0.5), 1.0)]))
+    said = re.search(r"keep-out 1 of at most ([\d.]+) m radius \(you gave 1 m\) in coast 1", failed.message)
+    assert not failed.success and said, failed.message
+    assert 0.45 < float(said[1]) <= 0.5
+
+
+def test_a_closed_coast_around_an_attractor_begins_with_a_circle():
+    found = solve(Mission(1.0, Free(2), Periodic(), [Coast(6.0)], [PointGravity(1.0)]))
+    assert found.success and dmoc.verify(found).ok
+    # Kepler: one revolution, a = (mu (T / 2 pi)^2)^(1/3).
+    radius, speed = np.linalg.norm(found.position[0]), np.linalg.norm(found.legs[0].velocity[0])
+    assert 1 / (2 / radius - speed**2) == pytest.approx((6.0 / (2 * np.pi)) ** (2 / 3), rel=1e-4)

@@ -35,6 +35,11 @@ from dmoc import (
     transcribe,
 )
 from dmoc.guess.starting import starting_guess
+from dmoc.motion.lobatto import scheme
+from dmoc.nlp.assembly import Scaling, assemble
+from dmoc.nlp.placement import Placement
+from dmoc.nlp.stencils import stencils_of
+from dmoc.nlp.units import units_of
 
 
 class Lag(Objective):
@@ -152,6 +157,36 @@ def test_jacobian_is_the_slope_of_the_constraints(scene):
         ends = [np.array(function(x + side * step * way, p)) for side in (1, -1)]
         difference = (ends[0] - ends[1]) / (2 * step)
         np.testing.assert_allclose(difference, slope, rtol=0, atol=1e-6 * (1 + np.abs(difference).max()))
+
+
+@pytest.mark.parametrize("hold", [False, True], ids=["nodal", "held"])
+@pytest.mark.parametrize("name", ["plane, everything", "plane, burning"])
+def test_units_and_mesh_may_be_parameters(name, hold):
+    """With the numbers of another scaling the functions are those that have it built in."""
+    problem = SCENES[name]
+    guess = starting_guess(problem, np.array([0.0, 0.1, 0.3, 0.6, 1.0]), 4, hold)
+    other = replace(guess, mesh=np.array([0.0, 0.3, 0.5, 0.9, 1.0]))
+    stencils = stencils_of(problem, 4, hold)
+    placed = [
+        Placement(problem, stencils, scheme(4), hold, path.mesh, replace(units_of(problem, path), force=unit))
+        for path, unit in ((guess, 1.0), (other, 0.3))
+    ]
+    scalings = [
+        Scaling.of(place.blocks, place.columns.scales(), place.rows.scales(), cost)
+        for place, cost in zip(placed, (1.0, 0.7), strict=True)
+    ]
+    assembled = assemble(placed[0].blocks, scalings[0], stencils.parameter_count, parametric=True)
+    built_in = assemble(placed[1].blocks, scalings[1], stencils.parameter_count)
+    numbers = np.random.default_rng(5)
+    x, lam = (numbers.uniform(0.4, 0.6, size) for size in (built_in.x.numel(), built_in.g.numel()))
+    p = numbers.uniform(0.5, 1.0, stencils.parameter_count)
+    both = (assembled, np.append(p, assembled.numbers(scalings[1]))), (built_in, p)
+    assert built_in.numbers(scalings[1]).size == 0
+    for given in ("objective", "constraints", "gradient", "jacobian", "hessian"):
+        dual = (0.8, lam) if given == "hessian" else ()
+        ours, theirs = (getattr(parts, given)(x, q, *dual) for parts, q in both)
+        pair = (ours[1], theirs[1]) if given in ("gradient", "jacobian") else (ours, theirs)
+        np.testing.assert_allclose(pair[0].full(), pair[1].full(), rtol=1e-13, atol=1e-13)
 
 
 def instructions(function):

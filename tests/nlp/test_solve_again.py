@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from dmoc import BallForce, BoxForce, KeepOut, LinearDrag, State, TransferProblem, solve, transcribe
+from dmoc.basics.memory import forget
+from dmoc.ipopt import run as ipopt
+from dmoc.nlp import transcription
+from dmoc.scene.problem_file import load_problem
 
 STEPS = 60
 
@@ -102,3 +106,37 @@ def test_a_loop_follows_a_target_that_moves(nlp, before):
 def test_a_failed_solve_says_so(nlp, before):
     weak = nlp.solve(replace(before.problem, actuator=BallForce(0.2)), guess=before)
     assert not weak.success and weak.status != "solved" and weak.message
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [("orbit_raise", {"radius": 1.6}), ("earth_mars", {"duration": 3.4}), ("free_flyer", {"mass": 11.0})],
+)
+def test_a_second_solve_builds_nothing(name, changed, monkeypatch):
+    """Neither one of a problem of other numbers, in other units, nor a stage of the rounding of |F|."""
+
+    def solved(**more):
+        return solve(load_problem(name).make(**more), order=4, steps=20).raise_for_status()
+
+    solved(**{key: 3.3193 for key in changed if key == "duration"})
+    with monkeypatch.context() as patched:
+        for place, maker in ((transcription, "assemble"), (ipopt, "_made")):
+            patched.setattr(place, maker, lambda *given, **more: pytest.fail("something is built anew"))
+        again = solved(**changed)
+    forget()
+    assert again.objective == pytest.approx(solved(**changed).objective, rel=1e-9)
+
+
+def test_a_solve_within_a_solve_keeps_its_own_watch():
+    """A user's function that follows a solve may solve the same problem."""
+    inner = []
+
+    def progress(order, steps, iteration, *rest):
+        if iteration == 2 and not inner:
+            inner.append("begun")
+            inner.append(solve(hop(), steps=STEPS, progress=lambda *row: inner.append(row[2])))
+
+    outer = solve(hop(), steps=STEPS, progress=progress)
+    alone = solve(hop(), steps=STEPS)
+    assert outer.iterations == inner[-1].iterations == alone.iterations
+    assert outer.success and any(isinstance(one, int) for one in inner)

@@ -73,10 +73,10 @@ from dmoc import (
     transcribe,
     verify,
 )
+from dmoc.chains.program import MissionProgram
 from dmoc.cli.app import main
 from dmoc.legs.events import Event
 from dmoc.missions.guess import guessed
-from dmoc.missions.program import MissionProgram
 from dmoc.plots.page import save_figure
 from dmoc.studies.drift import kepler
 from dmoc.teams.guess import guessed as team_guess

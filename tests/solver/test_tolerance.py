@@ -39,6 +39,30 @@ def test_a_tolerance_is_met_on_few_steps(name, tol, exact, most, order):
     assert abs(found.objective / exact - 1) <= max(found.error.largest, 1e-9)
 
 
+# Smooth problems, and their optima to ten digits.
+SMOOTH = {"orbit_raise": 1.6903228946e-3, "rendezvous": 1.0488423230643e-3}
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_one_mesh_is_enough_where_nothing_switches(name, tol):
+    problem = load_problem(name).make()
+    found = solve(problem, tol=tol).raise_for_status()
+    assert len(found.ladder) == 1 and found.error.largest <= tol
+    assert abs(found.objective / SMOOTH[name] - 1) <= found.error.objective
+    fine = solve(problem, order=8, steps=96)
+    ends = [one.position[:: one.order // 2] for one in (found, fine)]
+    at = [one.path.mesh for one in (found, fine)]
+    moved = [
+        np.abs(np.interp(at[0], at[1], theirs) - ours)
+        for ours, theirs in zip(ends[0].T, ends[1].T, strict=True)
+    ]
+    # The fine path is read off by straight lines between its 96 step ends.
+    shared = np.isin(np.round(at[0] * 96, 9), np.arange(97))
+    extent = np.ptp(fine.position, axis=0).max()
+    assert max(part[shared].max() for part in moved) <= found.error.path * extent
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_tolerance_may_begin_with_two_held_steps():
     found = asked("bang_bang", 1e-2, steps=2, hold=True)

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 
 import dmoc
-from dmoc import Engine, Fuel, KeepIn, Leg, Mission, State, TransferProblem, UniformGravity
+from dmoc import BoxForce, Engine, Fuel, KeepIn, Leg, Mission, State, TransferProblem, UniformGravity
 from dmoc.missions.answer import answered
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Climb, solve_mission
 from dmoc.scene.problem_file import load_problem
-from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, arcs_of, from_plain
+from dmoc.structure import solve as structure
+from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain
 from dmoc.structure.build import mission_of, path_of
 from dmoc.structure.improve import improved
+from dmoc.structure.modes import FREE
 from dmoc.structure.solve import NEAR, coarse_answer, solve_by_structure
+from dmoc.structure.surfaces import Surface
 
 # Two local optima of the free-flyer, on either side of the obstacles.
 FREE_FLYER = (0.8368975590572365, 0.8624183666704004)
@@ -39,7 +42,7 @@ def kinds(found):
 def test_seven_legs_of_the_least_fuel():
     found = dmoc.solve(gallery("two_body_fuel"), structure=True)
     assert found.success and kinds(found) == [BURN, COAST, BURN, COAST, BURN, COAST, BURN]
-    assert found.objective == pytest.approx(0.0767810992156, rel=1e-10)
+    assert found.objective == pytest.approx(0.0767810992549, rel=1e-10)
     assert found.reason.startswith("7 legs: burn 0.07165 s, coast 4.374 s, burn 0.9329 s")
     assert dmoc.verify(found).ok
 
@@ -112,7 +115,11 @@ DOZEN = [
 @pytest.mark.parametrize(
     ("name", "values", "meshes"),
     [
-        ("two_body_fuel", [0.0767810992156], DOZEN),
+        ("two_body_fuel", [0.0767810992549], DOZEN),
+        ("bang_bang", [2.0], DOZEN),
+        ("drone_hop", [211.4604945825], DOZEN),
+        ("earth_mars", [3.3192202779], DOZEN),
+        ("hovercraft", [10.9747903356], DOZEN),
         (
             "free_flyer",
             FREE_FLYER,
@@ -271,6 +278,84 @@ def test_steps_where_functions_are_not_finite_are_not_told(capfd):
     """On 30 steps Ipopt tries steps on which masses become negative."""
     dmoc.solve(gallery("goddard"), 2, 30, options={"ipopt.max_iter": 150})
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_box_has_arcs_by_axis():
+    found = dmoc.solve(gallery("bang_bang"), 4, 20, structure=True)
+    assert found.success and kinds(found) == ["+x", "-x"] and found.reason == "2 legs: +x 1 s, -x 1 s"
+    assert found.objective == pytest.approx(2.0, rel=1e-14)
+    assert dmoc.verify(found).ok
+
+
+def test_axes_of_a_box_switch_one_at_a_time():
+    """The axis with the longer way decides the time; both are limited, and the other one has room to spare."""
+    ends = State((0, 0), (0, 0)), State((1.0, 0.5), (0.0, 0.3))
+    problem = TransferProblem(1.0, *ends, 2.2, actuator=BoxForce((1.0, 0.6)))
+    found = dmoc.solve(problem, 4, 40, structure=True)
+    exact = dmoc.solve(problem, tol=1e-9, structure=False)
+    assert found.success and set(kinds(found)) > {"+x", "-x"}
+    assert found.objective == pytest.approx(exact.objective, rel=1e-8)
+    assert dmoc.verify(found).ok
+
+
+def test_a_force_that_comes_to_its_limit_goes_on_over_the_joint():
+    problem = gallery("drone_hop")
+    found = dmoc.solve(problem, 4, 30, structure=True)
+    assert found.success and kinds(found) == ["full force", "arc"]
+    # Indirect shooting: 211.4604947, to the digits given.
+    assert found.objective == pytest.approx(211.4604947, abs=2e-7)
+    full, rest = found.legs
+    assert np.linalg.norm(full.path.control, axis=1) == pytest.approx(15.0, abs=1e-9)
+    assert rest.path.control[0] == pytest.approx(full.path.control[-1], abs=1e-9)
+    assert np.linalg.norm(rest.path.control, axis=1)[1:].max() < 15.0
+    # Without the condition the free arc would begin earlier, above the limit.
+    loose = replace(found.problem, legs=[part for part in found.problem.legs if isinstance(part, Leg)])
+    other = solve_mission(loose, 4, 4, guess=found.path.as_arrays())
+    assert not other.success or abs(other.legs[0].duration / full.duration - 1) > 1e-4
+
+
+def test_a_missing_limit_is_found_by_its_multiplier():
+    problem = gallery("drone_hop")
+    found = dmoc.solve(problem, 4, 30, structure=True)
+    known = (Arc(FREE, 1.0),)
+    climb = Climb(mission_of(problem, known), None, None, False, None)
+    attempt = climb.attempt(path_of(problem, known, found.legs), near=NEAR[0])
+    assert attempt.solved
+    better = improved(problem, known, answered(climb, attempt))
+    assert "full force" in [arc.kind for arc in better]
+
+
+def test_an_engine_that_never_stops_is_one_leg():
+    found = dmoc.solve(gallery("earth_mars"), 4, 20, structure=True)
+    assert found.success and kinds(found) == [BURN] and found.reason == "1 leg: burn 3.319 s"
+    assert found.objective == pytest.approx(3.31922028, abs=5e-9)
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.slow
+def test_full_thrust_through_four_gates():
+    found = dmoc.solve(gallery("hovercraft"), structure=True)
+    assert found.success and kinds(found) == ["full force"] * 5
+    assert found.objective == pytest.approx(10.97479, abs=5e-6)
+    assert dmoc.verify(found).ok
+
+
+def test_nothing_keeps_a_coast_at_a_limit():
+    """Where a coarse path is at a zone for three steps, and coasts there, it touches the zone."""
+    surface = Surface(0, 0)
+    cuts = [(COAST, 0.5), (BURN, 0.6), (COAST, 1.0)]
+    arcs = _merged(cuts, [(0.49, 0.61, surface)], 0.02)
+    assert all(arc.follows is None for arc in arcs) and [arc.touches for arc in arcs].count(surface) == 1
+    along = _merged([(FREE, 1.0)], [(0.49, 0.61, surface)], 0.02)
+    assert [arc.follows for arc in along] == [None, surface, None]
+
+
+def test_a_search_for_legs_that_leads_nowhere_ends_early(monkeypatch):
+    problem = gallery("two_body_fuel")
+    monkeypatch.setattr(structure, "MOST_WORK", 0)
+    monkeypatch.setattr(structure, "MOST_TIMES", 0)
+    found = dmoc.solve(problem, 4, 30, structure=True)
+    assert not hasattr(found, "legs") and found.objective == dmoc.solve(problem, 4, 30).objective
 
 
 def test_what_structure_does_not_take_is_refused():

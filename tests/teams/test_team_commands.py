@@ -99,13 +99,25 @@ def test_a_failure_names_bodies_and_distance(folder, capsys):
     assert found["worst"][0]["row"].startswith(("red", "green", "apart red and green"))
 
 
+def test_every_body_of_a_team_is_simulated(folder, capsys):
+    run(capsys, "solve", "swap.py", "--steps", "10", "--out", "flight.nc")
+    code, said = run(capsys, "simulate", "swap.py", "--controls", "flight.nc", "--out", "marched.csv", "--json")
+    found = json.loads(said.out)["bodies"]
+    assert code == 0 and list(found) == ["red", "green"]
+    team = load("flight.nc")
+    for name, one in found.items():
+        assert one["final_position"] == pytest.approx(team.of(name).position[-1], abs=1e-8)
+        assert (folder / f"marched_{name}.csv").read_text().startswith("time [s]")
+    code, said = run(capsys, "simulate", "swap.py")
+    assert code == 0
+
+
 @pytest.mark.parametrize(
     "arguments, said",
     [
         (("export", "swap.py", "planner"), "a team of bodies is not exported"),
         (("effects", "swap.py"), "is a team of bodies"),
         (("study", "swap.py"), "is a team of bodies"),
-        (("simulate", "swap.py"), "cannot be simulated as a whole"),
         (("solve", "swap.py", "--structure"), "a dmoc.Team has neither"),
         (("solve", "swap.py", "--impulses", "auto"), "a dmoc.Team has neither"),
         (("solve", "swap.py", "--set", "distance=3"), "start 2 m apart, but are to keep 3 m"),

@@ -10,20 +10,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
+from dmoc.chains.path import MissionPath, joint_cost
+from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows
+from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.ipopt.options import NEAR, rounding, settings_for
 from dmoc.ipopt.run import Answer, Watch, make_solver, run
-from dmoc.missions.joining import (
-    WHOLE,
-    Given,
-    JointWriter,
-    end_parameters,
-    own_unknowns,
-    put_spans,
-    row_to_drop,
-    whole_rows,
-)
-from dmoc.missions.path import MissionPath, joint_cost
-from dmoc.missions.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
 from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_START, Layout

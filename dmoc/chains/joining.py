@@ -1,4 +1,4 @@
-"""The rows, unknowns and cost of a joint, and the rows of a mission as a whole.
+"""The rows, unknowns and cost of a joint.
 
 At a joint the discrete equations of both legs hold with their own boundary velocities: the last momentum of the
 leg before equals dl/dv at v-, the first of the leg behind it minus dl/dv at v+. Together with v+ = v- + dv they
@@ -14,14 +14,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.arguments import both_ends
+from dmoc.chains.within import Placed
 from dmoc.configurations.base import Configuration
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint
-from dmoc.missions.path import MissionPath
-from dmoc.missions.within import Placed
-from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
@@ -29,8 +26,6 @@ from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake, values_of, with_symbols
 from dmoc.scene.mission import Mission
 
-# The rows that belong to no joint are in the group of this name.
-WHOLE = "mission"
 # The size of an impulse is rounded at zero over this part of the unit of speed [-].
 ROUNDED = 1e-8
 
@@ -161,6 +156,8 @@ class JointWriter:
             self.rows += _named(f"{snake(type(event).__name__)}_{i + 1}", passed.rows)
             if passed.kick is not None:
                 self._pay(self.mission.objective.kick(*passed.kick))
+            if event.continued:
+                self._continue(i, event.continued)
             here = passed.after
         if joint.right is None:
             if joint.boundary is not None:
@@ -170,6 +167,16 @@ class JointWriter:
             self._pay(self.mission.objective.terminal(here.t, seen.position, seen.velocity, here.m))
         if self._behind is not None and here is not self._behind:
             self._join(here, self._behind)
+
+    def _continue(self, index: int, which: Sequence[int]) -> None:
+        """Rows by which controls of the leg behind begin with those at the end of the leg before."""
+        one, other = (self.legs[leg] for leg in (self.joint.left, self.joint.right))  # type: ignore[index]
+        places = list(which)
+        jump = self.take(other.at("force", 0)[places], "u") - self.take(one.at("force", -1)[places], "u")
+        labels = one.program.columns["force"].labels
+        self.rows += [
+            Row(f"goes_on_{index + 1}.{labels[at]}", jump[i], 0.0, 0.0, "N") for i, at in enumerate(places)
+        ]
 
     def _pay(self, cost: Any) -> None:
         self.cost = self.cost + self.mission.objective.sense * cost
@@ -222,70 +229,3 @@ def own_unknowns(joint: Joint, program: Program, mass: float) -> Layout:
             scale = np.array([[units.of(unit) for _, unit in known]])
             layout = layout.add(f"event {i}", "end", [name for name, _ in known], 1, scale)
     return layout
-
-
-def row_to_drop(mission: Mission, legs: Sequence[Placed], path: MissionPath) -> int:
-    """Which velocity is not asked for again at the end of a closed path: the largest at its start, or none, -1.
-
-    Where nothing does work the energy gives one of them, and a row for it would depend on the others.
-    """
-    still = all(event.keeps_energy for joint in mission.joints for event in joint.events)
-    kept = still and all(_keeps_energy(leg.program.dynamics) for leg in legs)
-    return int(np.argmax(np.abs(path.legs[0].start_velocity))) if kept else -1
-
-
-def _keeps_energy(dynamics: Dynamics) -> bool:
-    """Whether a leg has no controls, and no effect that does work or changes with time."""
-    push = ca.SX(dynamics.point(*dynamics.symbols())[2])
-    return not dynamics.controls and not dynamics.depends_on_time and push.is_zero()
-
-
-def spans_of(mission: Mission, legs: int) -> list[tuple[int, int, Any]]:
-    """The first and the last leg of each duration that is asked of several of them, and that duration [s]."""
-    whole = [] if mission.duration is None else [(0, legs - 1, mission.duration)]
-    return [*mission.sums, *whole]
-
-
-def put_spans(mission: Mission, legs: int, rows: Layout, sides: Sequence[np.ndarray]) -> None:
-    """Put those durations among the lower and upper bounds of the rows of joints, which `sides` are, scaled."""
-    for i, (_, _, span) in enumerate(spans_of(mission, legs)):
-        group = rows[WHOLE]
-        for side, end in zip(sides, both_ends(span), strict=True):
-            side[group.start + i] = end * group.scales[0, i]
-
-
-def whole_rows(
-    mission: Mission, legs: Sequence[Placed], drop: int, given: Given
-) -> tuple[list[Row], np.ndarray, ca.SX]:
-    """Rows of the mission as a whole: its duration, and that its path closes."""
-    pool: dict[tuple[int, ...], ca.SX] = {}
-
-    def take(places: np.ndarray) -> ca.SX:
-        return pool.setdefault(tuple(places), ca.SX.sym("x", len(places)))
-
-    first, last = legs[0], legs[-1]
-    rows: list[Row] = []
-    for begin, end, span in spans_of(mission, len(legs)):
-        total = ca.SX(0)
-        if begin < end:
-            total = take(legs[end].at(LEG_START, 0)) - take(legs[begin].at(LEG_START, 0))
-        free = "duration" in legs[end].program.columns
-        lasts = take(legs[end].at("duration", 0)) if free else given.duration(end)
-        rows.append(Row("duration", total + lasts, *both_ends(span), "s"))
-    if mission.closes:
-        begin = take(first.at("position", 0)) + first.program.units.origin
-        end = take(last.at("position", -1)) + last.program.units.origin
-        gap = take(last.at("goal.velocity", 0)) - take(first.at("start.velocity", 0))
-        body = first.program.dynamics.configuration
-        away = body.along(begin, end - begin)
-        rows += [
-            Row(f"closed.position.{name}", away[i], 0.0, 0.0, "m") for i, name in enumerate(body.velocity_names)
-        ]
-        rows += [
-            Row(f"closed.velocity.{name}", gap[i], 0.0, 0.0, "m/s")
-            for i, name in enumerate(body.velocity_names)
-            if i != drop
-        ]
-    if not rows:
-        return [], np.zeros(0, int), ca.SX(0, 1)
-    return rows, np.concatenate([*map(np.array, pool)]), ca.vertcat(*pool.values())

@@ -88,6 +88,19 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
         _leave(program, legs[index - 1].program.problem, 0, sides)
     if index + 1 < len(legs):
         _leave(program, legs[index + 1].program.problem, -1, sides)
+    for place, joint in ((0, mission.joints[index]), (-1, mission.joints[index + 1])):
+        for event in joint.events:
+            if event.continued and event.left_behind == (place == -1):
+                _leave_controls(program, event.continued, place, sides)
+
+
+def _leave_controls(program: Program, which: tuple[int, ...], place: int, sides: list[np.ndarray]) -> None:
+    """Leave the limits of controls at the first or last node to the leg beside it, where they go on."""
+    at = program.columns["force"].indices[list(which), place]
+    sides[0][at], sides[1][at] = -np.inf, np.inf
+    for group in program.rows.groups:
+        if group.kind == "control" and group.owner and group.owner.field == "actuator":
+            sides[2][group.indices[:, place]], sides[3][group.indices[:, place]] = -np.inf, np.inf
 
 
 def _leave(program: Program, beside: TransferProblem, place: int, sides: list[np.ndarray]) -> None:
@@ -135,9 +148,12 @@ def polynomial_rows(placed: Placed, leg: Leg) -> tuple[list[Row], np.ndarray, np
     for i, place in enumerate(at[few]):
         others = np.delete(at[few], i)
         weights[i] = np.prod((at[rest][:, None] - others) / (place - others), axis=1)
-    places = placed.columns + group.indices
+    lower, upper = program.problem.actuator.bounds(program.problem.dimension)
+    # What is kept at a limit is a constant.
+    places = (placed.columns + group.indices)[lower < upper]
     columns = [np.vstack([mine[rest], np.repeat(mine[few][:, None], len(rest), axis=1)]) for mine in places]
-    names = [f"{label}[{node}]" for label in group.labels for node in rest]
+    labels = [label for label, free in zip(group.labels, lower < upper, strict=True) if free]
+    names = [f"{label}[{node}]" for label in labels for node in rest]
     rows = [Row(name, None, 0.0, 0.0, "N") for name in names]
     return rows, np.hstack(columns), np.hstack([weights] * len(places))
 
