@@ -50,10 +50,8 @@ class Winding:
     @cached_property
     def turns(self) -> int:
         """Whole revolutions beyond the angle between the ends."""
-        # The time is nearly proportional to the angle, so their ratio corrects any first number: here that of
-        # circles with the parameters of both ends.
-        rate = 0.5 * sum(np.sqrt(self.mu / elements[0] ** 3) for elements, _ in self._ends)
-        turns = int(self.duration * rate / (2 * np.pi))
+        # The time is nearly proportional to the angle, so their ratio corrects any first number.
+        turns = 10
         for _ in range(ROUNDS):
             taken, known = self._time(turns) or self._time(turns + 1), turns
             turns = max(round((turns + 1) * self.duration / taken) - 1, 0)
@@ -93,20 +91,19 @@ class Winding:
 
     def _times(self, turns: int, bend: float) -> np.ndarray:
         """The times at the fractions of the angle [s]: dt = r^2 / sqrt(mu p) dL."""
-        at, time, cos, sin = self._grid(turns)
+        _, time, cos, sin, pieces = self._grid(turns)
         elements = self._elements(time, bend)
         pace = self._radius(elements, cos, sin) ** 2 / np.sqrt(self.mu * elements[0])
-        times = np.zeros(len(at))
-        np.cumsum(pace[1:] + pace[:-1], out=times[1:])
-        return times * (0.5 * at[1] * self._swept(turns)[1])
+        return np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1]) * pieces))
 
     def _grid(self, turns: int) -> tuple[np.ndarray, ...]:
-        """Even fractions of the angle, those of the time of an even change, cosine and sine of the angle."""
+        """Even fractions of the angle, those of the time of an even change; of L cosine, sine and steps."""
         if turns not in self._grids:
             at = np.linspace(0.0, 1.0, SAMPLES_A_TURN * (turns + 1) + 1)
             begin, swept = self._swept(turns)
             longitude = begin + at * swept
-            self._grids[turns] = at, self._even(at), np.cos(longitude), np.sin(longitude)
+            cos, sin = np.cos(longitude), np.sin(longitude)
+            self._grids[turns] = at, self._even(at), cos, sin, np.diff(longitude)
         return self._grids[turns]
 
     @cached_property
@@ -116,7 +113,8 @@ class Winding:
     def _swept(self, turns: int) -> tuple[float, float]:
         """The angle L at the start, and how much of it is passed."""
         begin, end = (longitude for _, longitude in self._ends)
-        return begin, (end - begin) % (2 * np.pi) + 2 * np.pi * turns
+        end = begin + (end - begin) % (2 * np.pi) + 2 * np.pi * turns
+        return begin, end - begin
 
     def _elements(self, time: np.ndarray, bend: float) -> np.ndarray:
         """p, f, g, h, k of the moment, shape (5, count), at fractions of the time of an even change."""

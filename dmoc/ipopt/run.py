@@ -77,8 +77,6 @@ ALWAYS: dict[str, Any] = {
 
 # So many solvers are held for one NLP, if it has at most this many unknowns.
 MOST_SOLVERS, MOST_UNKNOWNS = 4, 20_000
-# Where nobody is told of the iterations, a watch looks at every so many of a small NLP: they take milliseconds.
-SELDOM = 5
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,7 @@ def make_solver(
     if options or parts.x.numel() > MOST_UNKNOWNS:
         return _made(parts, settings, options, Follower.of(parts, watch) if watch else None)
     # Two threads may solve at a time, each with an eye of its own on the iterations.
-    key = (*settings.items(), watch and watch.tell is None, threading.get_ident())
+    key = (*settings.items(), watch is None, threading.get_ident())
     solver, follower = parts.solvers.pop(key, (None, None))
     if solver is None or (follower is not None and follower.telling):
         follower = Follower.of(parts, watch) if watch else None
@@ -139,8 +137,6 @@ def _made(
 ) -> ca.Function:
     derivatives = {"jac_g": parts.jacobian, "hess_lag": parts.hessian, "grad_f": parts.gradient}
     callback: dict[str, Any] = {} if follower is None else {"iteration_callback": follower}
-    if follower is not None and follower.watch.tell is None and parts.x.numel() <= MOST_UNKNOWNS:
-        callback["iteration_callback_step"] = SELDOM
     program = {"x": parts.x, "p": parts.p, "f": parts.f, "g": parts.g}
     given = options or {}
     try:

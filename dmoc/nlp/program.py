@@ -261,12 +261,7 @@ def _built_alike(new: Any, old: Any) -> bool:
     """
     structure = [(type(part), getattr(part, "structure", None)) for part in (new, old)]
     known = type(new).__module__.startswith("dmoc.")
-    return structure[0] == structure[1] and (known or _built_in(new) == _built_in(old))
-
-
-def _built_in(part: Any) -> dict[str, Any]:
-    """What a part has beside its adjustable fields."""
-    return {name: value for name, value in vars(part).items() if name not in part.adjustable}
+    return structure[0] == structure[1] and (known or built_in(new) == built_in(old))
 
 
 def _equal(new: Any, old: Any) -> bool:

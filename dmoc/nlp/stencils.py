@@ -24,7 +24,7 @@ from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.draft import ALL, Draft
 from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
-from dmoc.parts.rows import Row, title, with_symbols
+from dmoc.parts.rows import Row, built_in, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
 # A stencil takes the first entry of a group: that of the start.
@@ -42,12 +42,21 @@ def stencils_of(
     start are unknowns.
     """
     # The type belongs to the key: the structure of a user's part may happen to equal that of one of dmoc's.
-    same = [(type(part), part.structure) for part in (problem.actuator, problem.start, problem.goal)]
-    # Numbers of the library's constraints are symbols or bounds, so their types are enough.
-    zones = [(type(constraint), constraint.structure, constraint.on) for constraint in problem.constraints]
+    same = [_structure(part) for part in (problem.actuator, problem.start, problem.goal)]
+    zones = [(_structure(constraint), constraint.on) for constraint in problem.constraints]
     shape = configuration_of(problem), problem.free_duration, order, hold, curved, joined
     make = partial(_written, problem, scheme(order), hold, curved, joined)
     return remembered(make, "formulas", *shape, problem.effects, same, problem.objective, zones)
+
+
+def _structure(part: Any) -> tuple:
+    """What the rows of a part depend on beside its adjustable numbers.
+
+    Numbers of the library's parts are symbols or bounds. A user's own part may build any number into its rows
+    that it does not name as adjustable.
+    """
+    known = type(part).__module__.startswith("dmoc.")
+    return type(part), part.structure, () if known else tuple(built_in(part).items())
 
 
 def _written(problem: TransferProblem, rule: Scheme, hold: bool, curved: bool, joined: bool) -> Stencils:

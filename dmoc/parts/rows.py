@@ -22,6 +22,11 @@ class Row(NamedTuple):
     unit: str = ""
 
 
+def built_in(part: Any) -> dict[str, Any]:
+    """What a part has beside its adjustable fields."""
+    return {name: value for name, value in vars(part).items() if name not in part.adjustable}
+
+
 def title(part: Any, index: int) -> str:
     """A name for rows and numbers of a part: KeepOut, second in the list, is keep_out_2."""
     return f"{snake(type(part).__name__)}_{index + 1}"

@@ -17,6 +17,7 @@ from dmoc import (
     KeepOut,
     Nozzles,
     PointGravity,
+    Row,
     State,
     Time,
     TransferProblem,
@@ -159,6 +160,9 @@ def test_a_clearance_grows_by_the_way_that_is_gone():
 
 def test_zones_of_ones_own_are_left_out_and_those_that_are_met_are_touched():
     class Ceiling(Constraint):
+        def rows(self, t, q, u, m):
+            return [Row("height", q[1], -np.inf, 1.0)]
+
         def excess(self, q, v):
             return np.maximum(0.0, q[:, 1] - 1)
 

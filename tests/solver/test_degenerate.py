@@ -71,11 +71,11 @@ def test_the_switching_curve_itself():
     parts = {"effects": [Spring(1.0, (0.0,))], "actuator": BoxForce(1.0), "objective": Time()}
     problem = TransferProblem(1.0, start, goal, (1.0, 20.0), **parts)
     for steps in (50, 100, 200):
-        assert certified(problem, steps=steps).objective == pytest.approx(
+        assert certified(problem, order=2, steps=steps).objective == pytest.approx(
             2 * steps * np.sin(np.pi / (2 * steps)), abs=1e-8
         )
     # limits that are relaxed by 1e-7 are worth 6e-4 of the time
-    relaxed = solve(problem, steps=100, options={"ipopt.bound_relax_factor": 1e-7})
+    relaxed = solve(problem, order=2, steps=100, options={"ipopt.bound_relax_factor": 1e-7})
     assert relaxed.objective < 200 * np.sin(np.pi / 200) - 1e-4
 
 

@@ -11,13 +11,13 @@ from dmoc.scene.problem_file import load_problem
 
 
 class Clock:
-    """A clock on which every iteration of Ipopt takes a hundredth of a second: it is looked at every few."""
+    """A clock on which every iteration of Ipopt, and every look at the time, takes a hundredth of a second."""
 
     def __init__(self):
         self.now = 0.0
 
     def __call__(self):
-        self.now += 0.01 * ipopt.SELDOM
+        self.now += 0.01
         return self.now
 
 
