@@ -21,7 +21,7 @@ from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.units import Units
-from dmoc.parts.rows import alike, values_of
+from dmoc.parts.rows import alike, built_in, values_of
 from dmoc.scene.problem import TransferProblem
 
 
