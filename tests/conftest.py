@@ -1,9 +1,18 @@
+import os
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
 # Names of tests, one a line, that take long although their neighbours with other parameters do not.
 LONG = Path(__file__).with_name("long_tests.txt")
+# Of a test with more cases than this every second one is among the slow tests, but for those that read source
+# files: continuous integration has twelve minutes on two cores.
+MOST_CASES = 4
+WHOLE = ("test_house.py", "test_layers.py", "test_docs.py", "test_pages.py", "test_site.py", "test_problems.py")
+# Two workers share two cores: further threads for small matrices would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 def pytest_collection_modifyitems(config, items):
@@ -13,6 +22,13 @@ def pytest_collection_modifyitems(config, items):
     found = {item.nodeid: item for item in items}
     for name in names & found.keys():
         found[name].add_marker(pytest.mark.slow)
+    cases = defaultdict(list)
+    for item in items:
+        if item.path.name not in WHOLE and hasattr(item, "callspec"):
+            cases[item.path, item.originalname].append(item)
+    for group in cases.values():
+        for item in group[1::2] if len(group) > MOST_CASES else ():
+            item.add_marker(pytest.mark.slow)
     whole = not config.option.keyword and config.args == [str(root / "tests")]
     if whole and (gone := names - found.keys()):
         raise pytest.UsageError(f"{LONG.name} names what is no test: {min(gone)}")

@@ -731,7 +731,7 @@ def empty(tmp_path, monkeypatch):
 OPTIONS = [(verb, option) for verb, (_, options) in VERBS.items() for option in options]
 # where a file is written every other text is a good name
 NO_FILES = ["", " ", ".", "..", "/", "a" * 300, "no/such/file.nc", "x.gif", "/dev/null"]
-SHARES = [8, pytest.param(1, marks=pytest.mark.slow)]
+SHARES = [16, pytest.param(1, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("share", SHARES)
