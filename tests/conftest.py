@@ -6,8 +6,8 @@ import pytest
 
 # Names of tests, one a line, that take long although their neighbours with other parameters do not.
 LONG = Path(__file__).with_name("long_tests.txt")
-# Of a test with more cases than this every second one is among the slow tests, but for those that read source
-# files: continuous integration has twelve minutes on two cores.
+# Of a test with more cases than this every third one is run, the others are among the slow tests, but for those
+# that read files: continuous integration has twelve minutes on two cores.
 MOST_CASES = 4
 WHOLE = ("test_house.py", "test_layers.py", "test_docs.py", "test_pages.py", "test_site.py", "test_problems.py")
 # Two workers share two cores: further threads for small matrices would wait for each other.
@@ -27,8 +27,9 @@ def pytest_collection_modifyitems(config, items):
         if item.path.name not in WHOLE and hasattr(item, "callspec"):
             cases[item.path, item.originalname].append(item)
     for group in cases.values():
-        for item in group[1::2] if len(group) > MOST_CASES else ():
-            item.add_marker(pytest.mark.slow)
+        for i, item in enumerate(group if len(group) > MOST_CASES else ()):
+            if i % 3:
+                item.add_marker(pytest.mark.slow)
     whole = not config.option.keyword and config.args == [str(root / "tests")]
     if whole and (gone := names - found.keys()):
         raise pytest.UsageError(f"{LONG.name} names what is no test: {min(gone)}")
