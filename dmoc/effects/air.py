@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
-from dmoc.effects.atmosphere import Atmosphere, checked_wind
+from dmoc.effects.atmosphere import AroundABody, checked_wind
 
 # The polynomial has at least and at most these degrees, and follows the table so closely if it can [-].
 LOWEST, HIGHEST, CLOSE = 3, 16, 1e-3
@@ -24,7 +24,7 @@ EARTH_RATE = 7.2921159e-5
 
 
 @dataclass(frozen=True)
-class TabulatedAtmosphere(Atmosphere):
+class TabulatedAtmosphere(AroundABody):
     """Air around a sphere at the origin, whose density is known at some heights.
 
     The logarithm of the density is the polynomial in the logarithm of the height that comes closest to the
@@ -114,19 +114,8 @@ class TabulatedAtmosphere(Atmosphere):
         source = [self.source] if self.source else []
         return [*source, f"a table from {low} to {high} km that is met to {100 * self.error:.2g} %"]
 
-    def body_radius(self) -> float:
-        return self.radius
-
-    def check_dimension(self, dimension: int) -> None:
-        if dimension == 1:
-            raise ValueError("TabulatedAtmosphere needs 2 or 3 dimensions; got 1")
-        if self.wind is not None:
-            self.wind.check_dimension(dimension)
-
     def density_at(self, t: Any, q: Any) -> Any:
-        # At the centre of the sphere the square root alone has no derivative; the second term gives it one, and
-        # is lost in rounding outside of the sphere.
-        height = ca.sqrt(ca.dot(q, q) + (1e-9 * self.radius) ** 2) - self.radius
+        height = self.height_at(q)
         low, high = self.heights[0], self.heights[-1]
         inside = ca.fmin(ca.fmax(height, low), high)
         polynomial = self._fit[0]
@@ -134,12 +123,6 @@ class TabulatedAtmosphere(Atmosphere):
         ends = [polynomial.deriv()(math.log(end)) / end for end in (low, high)]
         below, above = ca.fmax(ca.fmin(height, low), 0.0) - low, ca.fmax(height, high) - high
         return ca.exp(_clenshaw(polynomial, ca.log(inside)) + ends[0] * below + ends[1] * above)
-
-    def velocity_at(self, t: Any, q: Any) -> Any:
-        drift = 0 if self.wind is None else self.wind.velocity(t, q)
-        if self.rate == 0:
-            return drift
-        return drift + self.rate * ca.vertcat(-q[1], q[0], *([0] if q.numel() == 3 else []))
 
 
 def msis_atmosphere(

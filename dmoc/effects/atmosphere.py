@@ -113,8 +113,37 @@ class UniformAtmosphere(Atmosphere):
         return 0 if self.wind is None else self.wind.velocity(t, q)
 
 
+class AroundABody(Atmosphere):
+    """Air whose density hangs on the height above a sphere around the origin, and that may turn with it."""
+
+    radius: float
+    rate: float
+    wind: Any
+
+    def body_radius(self) -> float:
+        return self.radius
+
+    def check_dimension(self, dimension: int) -> None:
+        if dimension == 1:
+            raise ValueError(f"{type(self).__name__} needs 2 or 3 dimensions; got 1")
+        if self.wind is not None:
+            self.wind.check_dimension(dimension)
+
+    def height_at(self, q: Any) -> Any:
+        """Height above the sphere [m]."""
+        # At the centre of the sphere the square root alone has no derivative; the second term gives it one, and
+        # is lost in rounding outside of the sphere.
+        return ca.sqrt(ca.dot(q, q) + (1e-9 * self.radius) ** 2) - self.radius
+
+    def velocity_at(self, t: Any, q: Any) -> Any:
+        drift = 0 if self.wind is None else self.wind.velocity(t, q)
+        if is_zero(self.rate):
+            return drift
+        return drift + self.rate * ca.vertcat(-q[1], q[0], *([0] if q.numel() == 3 else []))
+
+
 @dataclass(frozen=True)
-class ExponentialAtmosphere(Atmosphere):
+class ExponentialAtmosphere(AroundABody):
     """Air around a sphere at the origin, thinner with height: density exp((height - h)/scale_height).
 
     h = |q| - radius is the height of the body. The air turns with the sphere about the z axis: its velocity
@@ -165,27 +194,9 @@ class ExponentialAtmosphere(Atmosphere):
                 f"got {self.height:g} and {self.radius:g} m"
             )
 
-    def body_radius(self) -> float:
-        return self.radius
-
-    def check_dimension(self, dimension: int) -> None:
-        if dimension == 1:
-            raise ValueError("ExponentialAtmosphere needs 2 or 3 dimensions; got 1")
-        if self.wind is not None:
-            self.wind.check_dimension(dimension)
-
     def density_at(self, t: Any, q: Any) -> Any:
-        # at the centre of the sphere the square root alone has no derivative; the second term gives it one, and
-        # is lost in rounding outside of the sphere
-        distance = ca.sqrt(ca.dot(q, q) + (1e-9 * self.radius) ** 2)
-        above = ca.fmax(distance - self.radius, -5 * self.scale_height)
+        above = ca.fmax(self.height_at(q), -5 * self.scale_height)
         return self.density * ca.exp((self.height - above) / self.scale_height)
-
-    def velocity_at(self, t: Any, q: Any) -> Any:
-        drift = 0 if self.wind is None else self.wind.velocity(t, q)
-        if is_zero(self.rate):
-            return drift
-        return drift + self.rate * ca.vertcat(-q[1], q[0], *([0] if q.numel() == 3 else []))
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,8 @@ def run(capsys, *arguments):
 
 @pytest.fixture
 def planets(tmp_path, monkeypatch):
+    # In a narrow terminal the names of effects would be broken.
+    monkeypatch.setenv("COLUMNS", "160")
     (tmp_path / "planets.py").write_text(PLANETS)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -220,7 +222,7 @@ def test_starts_from_the_command_line(planets, capsys):
 
 def test_what_an_effect_of_a_mission_does_is_told_by_the_leg_it_moves_most(planets, capsys):
     code, said = run(capsys, "effects", "planets.py")
-    assert code == 0 and "PointGravity" in said.out
+    assert code == 0 and "PointGravity, mu 1 m^3/s^2" in said.out
     legs = [Coast(0.3), Impulse(), Coast(2.0), Impulse()]
     mission = replace(hohmann(), legs=[Impulse(), *legs], duration=(1, 60))
     mission = replace(mission, legs=[Coast(0.3), *legs[1:3], Impulse()], goal=mission.start, duration=None)
