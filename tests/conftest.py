@@ -18,6 +18,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 def pytest_collection_modifyitems(config, items):
     """Mark the tests that take long; a name in the list that is no test is an error."""
     names = {line for line in LONG.read_text().splitlines() if line}
+    # The longest test begins first: at the end the other worker would wait for it.
+    items.sort(key=lambda item: item.path.name != "test_campaign.py")
     root = config.rootpath
     found = {item.nodeid: item for item in items}
     for name in names & found.keys():
