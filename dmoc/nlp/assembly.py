@@ -101,13 +101,16 @@ class Assembly:
         """The last entries of p for other units or another mesh; none where these are constants."""
         if not self.parametric:
             return np.empty(0)
-        products = [
-            side[np.array(matrix.sparsity_out(place).row(), int)]
-            * scaling.columns[np.array(matrix.sparsity_out(place).get_col(), int)]
-            for side, matrix, place in ((scaling.rows, self.jacobian, 1), (scaling.columns, self.hessian, 0))
-        ]
+        sides = scaling.rows, scaling.columns
+        products = [side[row] * scaling.columns[column] for side, (row, column) in zip(sides, self._entries, strict=True)]
         values = [given.ravel(order="F") for given in scaling.values]
         return np.concatenate([scaling.columns, scaling.rows, [scaling.cost], *values, *products])
+
+    @cached_property
+    def _entries(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Rows and columns of the entries of Jacobian and Hessian."""
+        patterns = self.jacobian.sparsity_out(1), self.hessian.sparsity_out(0)
+        return [(np.array(pattern.row(), int), np.array(pattern.get_col(), int)) for pattern in patterns]
 
     @cached_property
     def leaning(self) -> Assembly:

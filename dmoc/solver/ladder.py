@@ -25,7 +25,7 @@ from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung, answered, cut_short, held_answer, in_tube, out_of_tube, rounded
+from dmoc.solver.rung import Rung, answered, cut_short, far_from_zero, held_answer, in_tube, out_of_tube, rounded
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
@@ -88,7 +88,10 @@ class Ladder:
         cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
         stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
-        for mesh, rounding in stages:
+        rung: Rung | None = None
+        for i, (mesh, rounding) in enumerate(stages):
+            if rung is not None and i + 1 < len(stages) and mesh is stages[i - 1][0] and far_from_zero(rung):
+                continue
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
@@ -97,6 +100,7 @@ class Ladder:
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first
+        assert rung is not None
         return rung if rung.solved else self._by_half(rung, first)
 
     def _solved_or_explained(
@@ -250,14 +254,14 @@ class Ladder:
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
         units = units_of(problem, guess)
         nlp = transcribe_onto(problem, guess, units, self.compiled, chart_of(problem, guess, units.origin))
-        # Later attempts start from answers, where all rows have values.
-        if last is None:
-            refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
         asked_of = nlp.leaning(guess, lean) if lean else nlp
         solver = asked_of.solver(self.options, bool(guess.multipliers), carried, watch, limits)
         built = time.perf_counter() - begun
         answer = asked_of.run(solver, problem, guess, pinned)
+        # Later attempts start from answers, where all rows have values.
+        if last is None and answer.status == "invalid number":
+            refuse_undefined_rows(nlp, problem, guess)
         if lean:
             true = float(nlp.assembly.objective(answer.x, nlp.parameters(problem)))
             answer = replace(answer, objective=true)

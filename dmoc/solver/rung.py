@@ -37,6 +37,9 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
+# A throttle that is everywhere more than this many times the rounding of |F| at zero is far from it [-]: there the
+# rounding changes |F| by 2 % at most.
+FAR = 5.0
 # A node may leave its place in the guess by this part of its distance from the attractor [-], along each axis:
 # half of the width of the tube.
 WIDTH = 0.4
@@ -174,6 +177,15 @@ def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem
         return problem
     engine: Any = problem.actuator
     return replace(problem, actuator=replace(engine, smoothing=rounding))
+
+
+def far_from_zero(rung: Rung) -> bool:
+    """Whether |F| of an answer is nowhere near zero, so that the next one needs no less rounding on the way."""
+    engine = rung.nlp.problem.actuator
+    if not rung.solved or engine.smoothing is None:
+        return False
+    share = rung.path.control[:, -1] / engine.bounds(rung.problem.dimension)[1][-1]
+    return bool(share.min() > FAR * engine.smoothing)
 
 
 def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Solution:
