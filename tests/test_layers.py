@@ -26,6 +26,7 @@ LAYERS = [
     ["guess", "results", "flights"],
     ["ipopt"],
     ["nlp"],
+    ["meshes"],
     ["diagnosis"],
     ["solver", "checks"],
     ["chains"],

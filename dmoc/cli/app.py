@@ -108,7 +108,7 @@ def show(name: Name, settings: Settings = None) -> None:
     from dmoc.nlp.transcription import transcribe_onto
     from dmoc.nlp.units import units_of
     from dmoc.reports import words as report
-    from dmoc.solver.meshes import first_path
+    from dmoc.meshes.choices import first_path
 
     file, problem = problem_of(name, settings)
     console = report.console()

@@ -33,7 +33,7 @@ from dmoc.planners.whole import coded, mission_functions
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.sensitivity.exported import prediction
-from dmoc.solver.meshes import DEFAULT_STEPS
+from dmoc.meshes.choices import DEFAULT_STEPS
 from dmoc.solver.solve import check_numerics
 
 # The remedy that is told where a folder holds what an export must not take the place of.

@@ -24,7 +24,7 @@ from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
-from dmoc.solver.meshes import WIDEST_ROUNDING
+from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
 from dmoc.solver.solve import check_numerics
 

@@ -23,7 +23,7 @@ from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import A_TURN, UNEVEN
+from dmoc.meshes.choices import A_TURN, UNEVEN
 
 # A leg has this order if none is asked for: inside a leg nothing switches, so that a high order pays.
 ORDER = 6

@@ -14,7 +14,7 @@ from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import WIDER, Ladder
-from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
+from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
 from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest

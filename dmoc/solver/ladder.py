@@ -24,7 +24,7 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import coarse_to_fine, rounding_stages
+from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.solver.rung import Rung, answered, cut_short, far_from_zero, held_answer, in_tube, out_of_tube, rounded
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
@@ -88,9 +88,8 @@ class Ladder:
         cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
         stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
-        rung: Rung | None = None
         for i, (mesh, rounding) in enumerate(stages):
-            if rung is not None and i + 1 < len(stages) and mesh is stages[i - 1][0] and far_from_zero(rung):
+            if i + 1 < len(stages) and mesh is stages[i + 1][0] and far_from_zero(known, self.problem):
                 continue
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
@@ -100,7 +99,6 @@ class Ladder:
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first
-        assert rung is not None
         return rung if rung.solved else self._by_half(rung, first)
 
     def _solved_or_explained(

@@ -18,7 +18,7 @@ from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
+from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 from dmoc.solver.rung import Rung
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.

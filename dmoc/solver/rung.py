@@ -22,6 +22,7 @@ from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.clock import cautions_of
 from dmoc.scene.problem import TransferProblem
+from dmoc.meshes.choices import WIDEST_ROUNDING
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
@@ -37,7 +38,7 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
-# A throttle that is everywhere more than this many times the rounding of |F| at zero is far from it [-]: there the
+# A throttle that is everywhere more than this many times the widest rounding of |F| is far from zero [-]: there the
 # rounding changes |F| by 2 % at most.
 FAR = 5.0
 # A node may leave its place in the guess by this part of its distance from the attractor [-], along each axis:
@@ -179,13 +180,13 @@ def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem
     return replace(problem, actuator=replace(engine, smoothing=rounding))
 
 
-def far_from_zero(rung: Rung) -> bool:
-    """Whether |F| of an answer is nowhere near zero, so that the next one needs no less rounding on the way."""
-    engine = rung.nlp.problem.actuator
-    if not rung.solved or engine.smoothing is None:
+def far_from_zero(path: DiscretePath, problem: TransferProblem) -> bool:
+    """Whether |F| along a path is nowhere near zero, so that no wide rounding of it must lead to the next answer."""
+    engine, used = problem.actuator, path.control[:, -1]
+    if engine.smoothing is None or not used.any():
         return False
-    share = rung.path.control[:, -1] / engine.bounds(rung.problem.dimension)[1][-1]
-    return bool(share.min() > FAR * engine.smoothing)
+    most = engine.bounds(problem.dimension)[1][-1]
+    return bool(used.min() > FAR * max(engine.smoothing, WIDEST_ROUNDING) * most)
 
 
 def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Solution:

@@ -21,7 +21,7 @@ from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import NEAR, goal_missed
-from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
+from dmoc.meshes.choices import COARSEST_NODES, first_path, least_steps
 from dmoc.solver.revolutions import Sounding, promise, solved_from
 from dmoc.solver.rung import Rung
 

@@ -16,7 +16,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
-from dmoc.solver.meshes import first_path, followed
+from dmoc.meshes.choices import first_path, followed
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.rung import Rung

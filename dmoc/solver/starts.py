@@ -21,7 +21,7 @@ from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import is_flyable
-from dmoc.solver.meshes import (
+from dmoc.meshes.choices import (
     COARSEST_NODES,
     WIDEST_ROUNDING,
     coarse_to_fine,

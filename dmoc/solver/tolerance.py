@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import STATUSES
+from dmoc.meshes.smooth import finer, smooth_path
 from dmoc.motion.path import DiscretePath
 from dmoc.results.estimate import (
     LEAST_FALL,
@@ -27,12 +27,14 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
-from dmoc.solver.meshes import TRIAL_ORDER, best_order, order_of_smooth, trial_path, with_as_many_nodes
+from dmoc.meshes.choices import TRIAL_ORDER, best_order, trial_path, with_as_many_nodes
 from dmoc.solver.rung import Rung, at_rest
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
+# A smooth transfer is solved on so many meshes, each as fine as the error of the one before asks for.
+MOST_AT_ONCE = 2
 # Refinement ends after this many meshes: steps at a switch have then come down to the shortest.
 MOST_MESHES = 14
 # A step in which the control jumps is cut into this many parts.
@@ -82,12 +84,13 @@ def climb_to_tolerance(
     limits it may be the answer. All step ends are kept from mesh to mesh: the answer on one is a good start for
     the next, and the change there tells the error.
     """
-    first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
     smooth = not (ladder.problem.limited or hold)
-    if smooth and order is None:
+    if smooth and order is None and steps is None:
         # Nothing can switch, so that no trial is needed.
-        order = order_of_smooth(tol)
-        first = starting_guess(ladder.problem, with_as_many_nodes(first, order), order, hold, guess)
+        first = smooth_path(ladder.problem, tol, guess)
+        order = first.order
+    else:
+        first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
     trial = flat_optimum(ladder, first, tol)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
@@ -108,8 +111,14 @@ def climb_to_tolerance(
             return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
     refinement = _Refinement(ladder, tol, local, reason)
-    if smooth and refinement.meets_at_once(trial):
-        return refinement.settled(reason)
+    for _ in range(MOST_AT_ONCE if smooth else 0):
+        if refinement.meets_at_once(trial):
+            return refinement.settled(reason)
+        mesh = finer(trial.path, refinement.errors[trial.number], tol)
+        again = ladder.solve_on(trial.path.onto(mesh, order, hold))
+        if not again.solved:
+            break
+        trial = again
     return refinement.of(trial, order, hold)
 
 

@@ -18,7 +18,7 @@ from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import first_path
+from dmoc.meshes.choices import first_path
 from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of

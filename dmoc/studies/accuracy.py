@@ -26,7 +26,7 @@ from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import guess_on
+from dmoc.meshes.choices import guess_on
 from dmoc.solver.solve import solve
 from dmoc.studies.other_methods import Formulation as Formulation
 from dmoc.studies.other_methods import Method, Run, counted, solve_other
