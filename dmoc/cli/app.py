@@ -105,10 +105,10 @@ def new(
 @app.command(epilog="Example: dmoc show free_flyer")
 def show(name: Name, settings: Settings = None) -> None:
     """Say what a problem is: the scene, its parameters, the size of its NLP as solved without options."""
+    from dmoc.meshes.choices import first_path
     from dmoc.nlp.transcription import transcribe_onto
     from dmoc.nlp.units import units_of
     from dmoc.reports import words as report
-    from dmoc.meshes.choices import first_path
 
     file, problem = problem_of(name, settings)
     console = report.console()

@@ -21,6 +21,7 @@ from dmoc.configurations.coordinates import PLACE
 from dmoc.exports.code import write_code, write_mission_code
 from dmoc.exports.manifest import EXPORT_FORMAT, EXPORT_VERSION, about_mission, about_transfer, manifest, plain
 from dmoc.exports.readme import mission_readme, readme
+from dmoc.meshes.choices import DEFAULT_STEPS
 from dmoc.motion.lobatto import scheme
 from dmoc.planners import functions as export_functions
 from dmoc.planners import planner as export_solver
@@ -33,7 +34,6 @@ from dmoc.planners.whole import coded, mission_functions
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.sensitivity.exported import prediction
-from dmoc.meshes.choices import DEFAULT_STEPS
 from dmoc.solver.solve import check_numerics
 
 # The remedy that is told where a folder holds what an export must not take the place of.

@@ -23,7 +23,7 @@ FEWEST = 8
 OFF = 3e-9
 # Elsewhere by this: 2e-6 to 1e-4 in four other problems.
 OFF_ELSEWHERE = 3e-5
-# A mesh has at most this many steps before an answer is known: rates along a guess that strays far off mean nothing.
+# A mesh has at most this many steps before an answer is known: a guess that strays far off tells nothing.
 MOST = 2000
 # From one answer to the next the steps become at most so many times as many.
 MOST_TIMES = 4.0

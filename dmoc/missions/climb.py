@@ -13,6 +13,7 @@ from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Answer, Interrupt, Watch
+from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
@@ -24,7 +25,6 @@ from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
-from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.solver.rung import rounded
 from dmoc.solver.solve import check_numerics
 

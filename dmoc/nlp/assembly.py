@@ -102,7 +102,10 @@ class Assembly:
         if not self.parametric:
             return np.empty(0)
         sides = scaling.rows, scaling.columns
-        products = [side[row] * scaling.columns[column] for side, (row, column) in zip(sides, self._entries, strict=True)]
+        products = [
+            side[row] * scaling.columns[column]
+            for side, (row, column) in zip(sides, self._entries, strict=True)
+        ]
         values = [given.ravel(order="F") for given in scaling.values]
         return np.concatenate([scaling.columns, scaling.rows, [scaling.cost], *values, *products])
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from dmoc.configurations.acting import state_symbols
 from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
+from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import WIDER, Ladder
-from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
 from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest

@@ -15,6 +15,7 @@ from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_row
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import STATUSES, Interrupt
+from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
@@ -24,8 +25,7 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.meshes.choices import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung, answered, cut_short, far_from_zero, held_answer, in_tube, out_of_tube, rounded
+from dmoc.solver.rung import Rung, answered, cut_short, held_answer, in_tube, nowhere_zero, out_of_tube, rounded
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
@@ -61,8 +61,7 @@ class Ladder:
         # Whether a problem that a message names has an answer, if somebody can say.
         self.holds: Callable[[TransferProblem], bool] | None = None
         self.patient = True  # a finer mesh is tried where a coarse one has no path
-        self._rungs: list[Rung] = []
-        self._levels: list[Level] = []
+        self._rungs, self._levels = list[Rung](), list[Level]()
         # Takes attempts that were made elsewhere.
         self.tell = self._levels.append
 
@@ -88,8 +87,8 @@ class Ladder:
         cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
         stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
-        for i, (mesh, rounding) in enumerate(stages):
-            if i + 1 < len(stages) and mesh is stages[i + 1][0] and far_from_zero(known, self.problem):
+        for (mesh, rounding), (following, _) in zip(stages, [*stages[1:], (None, None)], strict=True):
+            if mesh is following and nowhere_zero(known, self.problem):
                 continue
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)

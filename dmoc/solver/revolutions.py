@@ -10,6 +10,7 @@ from dmoc.basics.digits import lasting
 from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
 from dmoc.guess.starting import guess_duration, starting_guess
+from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -18,7 +19,6 @@ from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 from dmoc.solver.rung import Rung
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.

@@ -14,6 +14,7 @@ from dmoc.diagnosis.cause import Cause
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
 from dmoc.ipopt.run import Answer
+from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.parts.constraint import Constraint
@@ -22,7 +23,6 @@ from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.clock import cautions_of
 from dmoc.scene.problem import TransferProblem
-from dmoc.meshes.choices import WIDEST_ROUNDING
 
 # A duration that was kept is told of if another may save more than this part of the objective, to first order
 # [-].
@@ -38,8 +38,8 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
-# A throttle that is everywhere more than this many times the widest rounding of |F| is far from zero [-]: there the
-# rounding changes |F| by 2 % at most.
+# A throttle is far from zero if it is everywhere more than this many times the widest rounding of |F| [-]: that
+# changes |F| by 2 % at most.
 FAR = 5.0
 # A node may leave its place in the guess by this part of its distance from the attractor [-], along each axis:
 # half of the width of the tube.
@@ -180,8 +180,8 @@ def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem
     return replace(problem, actuator=replace(engine, smoothing=rounding))
 
 
-def far_from_zero(path: DiscretePath, problem: TransferProblem) -> bool:
-    """Whether |F| along a path is nowhere near zero, so that no wide rounding of it must lead to the next answer."""
+def nowhere_zero(path: DiscretePath, problem: TransferProblem) -> bool:
+    """Whether |F| is far from zero all along a path: no wide rounding of it has to lead to the next answer."""
     engine, used = problem.actuator, path.control[:, -1]
     if engine.smoothing is None or not used.any():
         return False

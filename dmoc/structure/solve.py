@@ -12,13 +12,13 @@ from dmoc.basics.digits import lasting
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
 from dmoc.guess.starting import angle_around
+from dmoc.meshes.choices import first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.meshes.choices import first_path
 from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
