@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from dmoc.flights.flight import Flight as Flight
     from dmoc.flights.flown import fly as fly
     from dmoc.identification.estimate import Estimate as Estimate
+    from dmoc.identification.foreseen import foresee as foresee
     from dmoc.identification.identify import identify as identify
     from dmoc.identification.identify import plan_for as plan_for
     from dmoc.legs.encounters import Bounce as Bounce
@@ -125,6 +126,7 @@ if TYPE_CHECKING:
     from dmoc.parts.forces import BoxForce as BoxForce
     from dmoc.parts.forces import FreeForce as FreeForce
     from dmoc.parts.forces import Unpowered as Unpowered
+    from dmoc.parts.information import Information as Information
     from dmoc.parts.objectives import Effort as Effort
     from dmoc.parts.objectives import FinalHeight as FinalHeight
     from dmoc.parts.objectives import FinalMass as FinalMass

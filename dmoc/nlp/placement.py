@@ -13,6 +13,7 @@ from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout, Limit, Stencil, Stencils
+from dmoc.nlp.lesson import limits, with_columns
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
@@ -48,6 +49,8 @@ class Placement:
         impulse = (problem.mass / (unit * units.time))[None]
         axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
+        if problem.objective.learns:
+            self._add_lesson(impulse)
         numbers = {
             "fraction": node_fractions(mesh, rule),
             "weight": node_weights(mesh, rule),
@@ -87,7 +90,18 @@ class Placement:
             columns = columns.add(LEG_START, "end", ("",), 1, units.time)
         columns = columns.add("start.velocity", "end", body.velocity_names, 1, speeds)
         columns = columns.add("goal.velocity", "end", body.velocity_names, 1, speeds)
-        return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
+        if problem.free_duration:
+            columns = columns.add("duration", "end", ("",), 1, units.time)
+        return with_columns(columns, problem, nodes, units.length) if problem.objective.learns else columns
+
+    def _add_lesson(self, impulse: np.ndarray) -> None:
+        """The rows of sensitivities, of which those of the goal are free, and of their regression."""
+        (motion, scale), *others = limits(self.problem, self.units.length, impulse)
+        self._add_rows(motion, self.counts["node"], scale)
+        free = slice(-len(motion.rows), None)
+        self._lower[-1][free], self._upper[-1][free] = -np.inf, np.inf
+        for limit, size in others:
+            self._add_rows(limit, 1, size)
 
     def _add_rows(self, limit: Limit, count: int, scale: Any) -> None:
         labels, units = [row.name for row in limit.rows], [row.unit for row in limit.rows]

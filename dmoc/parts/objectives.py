@@ -87,6 +87,8 @@ class Objective(Duties):
     # Whether it looks at the attitude of a body, and whether it needs its position.
     turns_body: ClassVar[bool] = False
     moves_body: ClassVar[bool] = False
+    # The numbers on which it counts information: their sensitivities are then unknowns of the optimisation.
+    learns: ClassVar[tuple[str, ...]] = ()
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the objective has no meaning in this many dimensions."""
@@ -105,6 +107,10 @@ class Objective(Duties):
 
     def kick(self, size: Any, mass: Any) -> Any:
         """Cost of an impulse between two legs: a velocity change [m/s] of a mass [kg]."""
+        return 0
+
+    def told(self, spreads: Any, duration: Any) -> Any:
+        """Value of what positions will tell, from how far each number alone moves the path: see `Information`."""
         return 0
 
     def unit_with(self, actuator: Actuator) -> str:
@@ -247,6 +253,8 @@ class WeightedSum(Objective):
             raise ValueError(f"WeightedSum: parts must be pairs (weight, objective); got {short(self.parts)}")
         parts = tuple((number("weight", weight, ""), term) for weight, term in pairs)
         checked(self, parts=parts)
+        if sum(bool(term.learns) for weight, term in self.parts if weight) > 1:
+            raise ValueError("a sum of objectives has one Information; give it all numbers: unknown=(.., ..)")
         pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
         if len(pulls) > 1:
             raise ValueError(
@@ -289,6 +297,13 @@ class WeightedSum(Objective):
 
     def kick(self, size: Any, mass: Any) -> Any:
         return sum(weight * term.kick(size, mass) for weight, term in self.parts if weight)
+
+    @property
+    def learns(self) -> tuple[str, ...]:  # type: ignore[override]
+        return tuple(name for weight, term in self.parts if weight for name in term.learns)
+
+    def told(self, spreads: Any, duration: Any) -> Any:
+        return sum(weight * term.told(spreads, duration) for weight, term in self.parts if weight)
 
     def unit_with(self, actuator: Actuator) -> str:
         units = {term.unit_with(actuator) for weight, term in self.parts if weight}

@@ -21,6 +21,7 @@ from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
+from dmoc.parts.information import learned_opened
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
@@ -110,6 +111,7 @@ class TransferProblem(Named):
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        checked(self, effects=learned_opened(self))
         checked(self, **with_both(self.inertia, self.start, self.goal))
         checked(self, **with_wheels(self.actuator, self.start, self.goal, tuple(self.constraints)))
         checked(self, **turning_checked(self.system, self.inertia, self.start, self.goal))
