@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.nlp.learned import fisher
+from dmoc.nlp.placement import fisher
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 from dmoc.parts.information import MASS, Information, constants_of
@@ -19,9 +19,9 @@ from dmoc.results.solution import Outcome, Solution
 def foresee(solution: Any, unknown: str | Sequence[str], noise: float, every: float) -> dict[str, float]:
     """Standard deviations that `identify` will give numbers after a flight of this plan.
 
-    To first order, with the state at the start unknown and exact forces: the inverse of the Fisher information, whose
-    logarithm is the objective `Information`, which says where it comes from. Any plan has one, whatever it was
-    made for.
+    To first order, with the state at the start unknown and exact forces: the inverse of the Fisher information,
+    whose logarithm is the objective `Information`, which says where it comes from. Any plan has one, whatever
+    it was made for.
 
     Parameters
     ----------

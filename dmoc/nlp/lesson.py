@@ -1,10 +1,11 @@
 """The sensitivities of a path to unknown numbers, as unknowns of the NLP with rows of their own.
 
-The derivative of every row of motion along a change of the numbers, or of the state at the start, is a row of the
-same stencil, exact and as local as that is. `Information` looks at what of the sensitivity to a number no change of
-the start, and of no number before it, brings about: at the residual of a regression, whose coefficients and root mean
-square are unknowns, too, few of them, to whose rows every node adds. Its square is a pivot of the Fisher information,
-that of the last number beside all others what is left of it; as unknowns pivots stay positive.
+The derivative of every row of motion along a change of the numbers, or of the state at the start, is a row of
+the same stencil, exact and as local as that is. `Information` looks at what of the sensitivity to a number no
+change of the start, and of no number before it, brings about: at the residual of a regression, whose
+coefficients and root mean square are unknowns, too, few of them, to whose rows every node adds. Its square is a
+pivot of the Fisher information, that of the last number beside all others what is left of it; as unknowns
+pivots stay positive.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ SENSITIVITY, SHARE, SPREAD = "sensitivity", "share", "spread"
 def ways_of(problem: Any) -> tuple[str, ...]:
     """What the path is varied by: position and velocity at the start along each axis, then the numbers.
 
-    A velocity counts in the length over the duration, a number relative to itself; all sensitivities are lengths,
-    those to the start per length.
+    A velocity counts in the length over the duration, a number relative to itself; all sensitivities are
+    lengths, those to the start per length.
     """
     axes = AXES[: problem.dimension]
     starts = [f"start.{kind}.{axis}" for kind in ("position", "velocity") for axis in axes]

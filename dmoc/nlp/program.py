@@ -20,8 +20,8 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
-from dmoc.nlp.learned import sensitivities
 from dmoc.nlp.lesson import SENSITIVITY, SPREAD, at_start
+from dmoc.nlp.placement import sensitivities
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import alike, built_in, values_of
 from dmoc.scene.problem import TransferProblem

@@ -22,13 +22,14 @@ MASS = "mass"
 class Information(Objective):
     """Largest information on unknown numbers: 1/2 log det of what positions will tell of them [nat].
 
-    With s_k the derivative of the discrete path by each number over its value, and by the state at the start, which
-    is unknown, too, positions measured every `every` seconds with errors of standard deviation `noise` have the
-    Fisher information F = sum_k s_k' s_k / noise^2. What is left of it for the numbers, the Schur complement of
-    the part of the start, is the inverse of their relative covariance in `identify` with exact forces; one unit
-    more of the objective makes the interval of one number exp(1) times narrower. The sum is that of the
-    scheme over its nodes, as if of samples all along the way, and s solves the derivative of the discrete
-    Euler-Lagrange equations. `Effort() - 2 * Information("mass", 0.001, 0.1)` trades one for the other.
+    With s_k the derivative of the discrete path by each number over its value, and by the state at the start,
+    which is unknown, too, positions measured every `every` seconds with errors of standard deviation `noise`
+    have the Fisher information F = sum_k s_k' s_k / noise^2. What is left of it for the numbers, the Schur
+    complement of the part of the start, is the inverse of their relative covariance in `identify` with exact
+    forces; one unit more of the objective makes the interval of one number exp(1) times narrower. The sum is
+    that of the scheme over its nodes, as if of samples all along the way, and s solves the derivative of the
+    discrete Euler-Lagrange equations. `Effort() - 2 * Information("mass", 0.001, 0.1)` trades one for the
+    other.
 
     Parameters
     ----------
@@ -43,9 +44,10 @@ class Information(Objective):
     Notes
     -----
     A. Wilson, J. Schultz, T. Murphey, Trajectory synthesis for Fisher information maximization, IEEE Trans.
-    Robotics 30 (2014); K. Albee, M. Ekal, et al., RATTLE: real-time information-based planning for on-orbit
-    assembly, IEEE Robotics and Automation Letters 7 (2022), who add the trace of the inverse to the effort. The
-    determinant does not depend on units.
+    Robotics 30 (2014). K. Albee, M. Ekal, B. Coltin, R. Ventura, R. Linares, D. Miller, The RATTLE motion
+    planning algorithm for robust online parametric model improvement with on-orbit validation, IEEE Robotics
+    and Automation Letters 7 (2022), add the trace of the inverse to the effort; the determinant does not depend
+    on units.
     """
 
     unknown: str | Sequence[str]
@@ -110,7 +112,8 @@ def learned_opened(problem: Any) -> tuple[Any, ...]:
     Raises
     ------
     ValueError
-        If there is no such number, or it has no relative size, or the body is not a single one that does not turn.
+        If there is no such number, or it has no relative size, or the body is not a single one that does not
+        turn.
     """
     names, effects = problem.objective.learns, tuple(problem.effects)
     if not names:

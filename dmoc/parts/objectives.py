@@ -110,7 +110,7 @@ class Objective(Duties):
         return 0
 
     def told(self, spreads: Any, duration: Any) -> Any:
-        """Value of what positions will tell, from how far each number alone moves the path: see `Information`."""
+        """Value of what positions will tell, from how far each number moves the path: see `Information`."""
         return 0
 
     def unit_with(self, actuator: Actuator) -> str:

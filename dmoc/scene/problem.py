@@ -119,14 +119,12 @@ class TransferProblem(Named):
         if self.objective.metered:
             checked(self, actuator=self.actuator.metered(self.dimension))
         if self.start.dimension != self.goal.dimension:
-            raise ValueError(
-                f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
-            )
+            sizes = f"start has {self.start.dimension} axes but goal has {self.goal.dimension}"
+            raise ValueError(f"{sizes}; give both the same")
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
-        for link in self.links:
-            link.check_dimension(self.dimension)
-        for part in parts:
+        for part in (*self.links, *parts):
             part.check_dimension(self.dimension)
+        for part in parts:
             check_acts_on(part, self.turns, self.start.has_position)
         self._check_clock()
         check_limited(self)
