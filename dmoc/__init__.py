@@ -77,9 +77,9 @@ if TYPE_CHECKING:
     from dmoc.flights.flight import Flight as Flight
     from dmoc.flights.flown import fly as fly
     from dmoc.identification.estimate import Estimate as Estimate
-    from dmoc.identification.foreseen import foresee as foresee
     from dmoc.identification.identify import identify as identify
-    from dmoc.identification.identify import plan_for as plan_for
+    from dmoc.identification.plans import foresee as foresee
+    from dmoc.identification.plans import plan_for as plan_for
     from dmoc.legs.encounters import Bounce as Bounce
     from dmoc.legs.encounters import Flyby as Flyby
     from dmoc.legs.encounters import Frame as Frame

@@ -102,8 +102,9 @@ def identify(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE,SIGMA",
-            help="A number to find: mass, drag, offset, strength, turn, delay, inertia, or one of an effect of "
-            "--scene. What it is thought to be, and how surely, may be left out; repeat for more.",
+            help="A number to find: mass, drag, offset, strength, turn, delay, inertia, with --scene tilt and "
+            "exhaust_velocity, or one of an effect. What it is thought to be, and how surely, may be left out; "
+            "repeat for more.",
         ),
     ] = None,
     scene: Annotated[
@@ -195,7 +196,9 @@ def _given(seen: Any, asked: list[str], mass: float | None, scene: Any) -> dict[
     effects = list(found.get("effects", ()))
     for text in asked:
         name, value, sigma = _parsed(text)
-        if name in ALWAYS and not (name == "drag" and effects):
+        if name in ("tilt", "exhaust_velocity"):
+            found |= _of_actuator(name, value, sigma, found)
+        elif name in ALWAYS and not (name == "drag" and effects):
             begin, several = ALWAYS[name]
             begin = found[name] if name == "mass" and isinstance(found.get(name), float) else begin
             size = {"offset": seen.axes, "inertia": 3}.get(name, 1)
@@ -212,6 +215,19 @@ def _given(seen: Any, asked: list[str], mass: float | None, scene: Any) -> dict[
     return found | {"effects": effects}
 
 
+def _of_actuator(name: str, value: float | None, sigma: float | None, found: dict[str, Any]) -> dict[str, Any]:
+    """An unknown number of the actuator of a scene."""
+    from dmoc.basics.unknown import Unknown, with_field
+
+    actuator = found.get("actuator")
+    if name == "tilt":
+        return {"tilt": Unknown((value or 0.0,) * 2, sigma)}
+    if actuator is None or not actuator.burns:
+        raise ValueError("exhaust_velocity needs a --scene whose actuator burns propellant")
+    begin = actuator.exhaust_velocity if value is None else value
+    return {"actuator": with_field(actuator, name, Unknown(begin, sigma))}
+
+
 def _of_scene(problem: Any) -> dict[str, Any]:
     """What a problem says of its body."""
     if hasattr(problem, "plan") or hasattr(problem, "members"):
@@ -219,6 +235,8 @@ def _of_scene(problem: Any) -> dict[str, Any]:
     if problem.system is not None:
         raise ValueError("--scene takes a transfer of one body; this problem has several")
     known = {"mass": problem.mass, "effects": problem.effects}
+    if problem.actuator.burns:
+        known["actuator"] = problem.actuator
     if problem.inertia is not None:
         known |= {"inertia": problem.inertia, "actuator": problem.actuator}
     return known
