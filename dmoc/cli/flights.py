@@ -49,6 +49,9 @@ def disperse(
     force: Annotated[float, typer.Option(help="Standard deviation of the force: 0.01 is 1 %.")] = 0.0,
     pointing: Annotated[float, typer.Option(help="Standard deviation of its direction, in rad.")] = 0.0,
     mass: Annotated[float, typer.Option(help="Standard deviation of the mass: 0.01 is 1 %.")] = 0.0,
+    force_noise: Annotated[
+        float, typer.Option(help="Standard deviation of a force in N, another one in each step.")
+    ] = 0.0,
     samples: Annotated[int, typer.Option(help="Number of flights, at least 2.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same flights.")] = 0,
     plot: Annotated[Path | None, typer.Option(help="Draw the flights here (png, pdf or svg).")] = None,
@@ -61,7 +64,7 @@ def disperse(
     writable(plot, drawn=True)
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
-        found = dmoc.disperse(solution, _pair(start), force, pointing, mass, samples, seed)
+        found = dmoc.disperse(solution, _pair(start), force, pointing, mass, samples, seed, force_noise)
     if plot is not None:
         from dmoc.charts.dispersion import dispersion_figure
         from dmoc.charts.study import save_page

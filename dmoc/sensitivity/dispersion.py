@@ -103,15 +103,16 @@ def disperse(
     mass: float = 0.0,
     samples: int = 1000,
     seed: int = 0,
+    force_noise: float = 0.0,
 ) -> Dispersion:
     """Fly the forces of a solution many times with errors, open loop.
 
     Errors are normally distributed. Those of force, pointing and mass are drawn once a flight and last for all
-    of it; propellant burns as planned. Flights are those of the variational scheme on the mesh of the solution.
-    The covariance is that of the linear map of the errors, P <- A P A' with the Jacobian A of each step
-    (Maybeck, Stochastic Models, Estimation, and Control 1, 1979), which is symplectic as the step is. Each kind
-    of error has random numbers of its own: leaving one out changes no other, and more samples only come behind
-    the ones before.
+    of it, noise of the force is drawn anew in each step; propellant burns as planned. Flights are those of the
+    variational scheme on the mesh of the solution. The covariance is that of the linear map of the errors, P <-
+    A P A' + Q with the Jacobian A of each step and the noise Q that it adds (Maybeck, Stochastic Models,
+    Estimation, and Control 1, 1979), which is symplectic as the step is. Each kind of error has random numbers
+    of its own: leaving one out changes no other, and more samples only come behind the ones before.
 
     Parameters
     ----------
@@ -130,6 +131,9 @@ def disperse(
         Flights, at least 2.
     seed : int
         The same seed gives the same flights.
+    force_noise : float
+        Standard deviation of a further force along each axis [N], another one in each step. White noise of the
+        power spectral density S [N^2 s] has sqrt(S / h) in a step that lasts h.
 
     Raises
     ------
@@ -150,7 +154,12 @@ def disperse(
             for stream, sigma in enumerate(sigmas)
         ]
     )
-    position, velocity = flights.flown(errors)
+    sigma = number("force_noise", force_noise, "N", nonnegative=True)
+    noise = None
+    if sigma:
+        drawn = np.random.default_rng([seed, len(sigmas)])
+        noise = sigma * drawn.standard_normal((samples, flights.steps, axes))
+    position, velocity = flights.flown(errors, noise)
     if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
         raise ValueError("a flight with these errors ends where the scheme has no solution; give smaller ones")
     slopes = flights.slopes() * np.concatenate(sigmas)
@@ -165,7 +174,7 @@ def disperse(
         position[:, ends],
         velocity[:, ends],
         (planned[0][0, ends], planned[1][0, ends]),
-        slopes @ slopes.transpose(0, 2, 1),
+        slopes @ slopes.transpose(0, 2, 1) + (flights.process(sigma) if sigma else 0.0),
         _chances(solution, position, velocity),
         tuple((part, float(np.quantile(off[0], part)), float(np.quantile(off[1], part))) for part in PARTS),
         seed,

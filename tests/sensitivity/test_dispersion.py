@@ -124,6 +124,39 @@ def test_the_documented_spread():
     assert found.sampled_sigma[-1] == pytest.approx(found.sigma[-1], rel=0.1)
 
 
+@pytest.mark.parametrize("order, hold", [(2, False), (4, True)])
+def test_noise_in_each_step(order, hold):
+    """Without effects each step's push F adds F h / m to the velocity, and half of that times h to the place."""
+    answer = solve(TransferProblem(**PLAIN), order=order, steps=20, hold=hold)
+    found = disperse(answer, force_noise=0.3, samples=2000, seed=3)
+    h, later = 0.25, 0.25 * np.arange(20)
+    kick = 0.3 * h / 2.0
+    speed, place = kick * np.sqrt(20), kick * np.sqrt(np.sum((later + h / 2) ** 2))
+    assert found.sigma[-1] == pytest.approx([place, place, speed, speed], rel=1e-9)
+    assert found.sampled_sigma[-1] == pytest.approx(found.sigma[-1], rel=0.06)
+    assert found.sigma[0] == pytest.approx(0, abs=1e-15)
+
+
+def test_noise_in_each_step_of_a_rough_flight():
+    """The linear covariance is that of differences of flights by the noise of every single step."""
+    answer = solve(TransferProblem(**ROUGH), order=4, steps=6)
+    flights, step = Flights(answer.problem, answer.path), 1e-5
+    pushed = np.zeros((36, 6, 3))
+    pushed[np.arange(36), np.arange(36) // 2 // 3, np.arange(36) // 2 % 3] = np.tile([step, -step], 18)
+    position, velocity = flights.flown(np.zeros((36, flights.size)), pushed)
+    states = np.concatenate([position, velocity], axis=2)[:, ::2]
+    slopes = (states[::2] - states[1::2]) / (2 * step)
+    expected = 0.04 * np.einsum("nki,nkj->kij", slopes, slopes)
+    assert flights.process(0.2) == pytest.approx(expected, abs=1e-9)
+    # It adds to what lasts, and each sample has noise of its own, the same whatever comes behind it.
+    both = disperse(answer, (0.01, 0.0), force_noise=0.2, samples=300, seed=1)
+    alone = disperse(answer, (0.01, 0.0), samples=300, seed=1)
+    assert both.covariance - alone.covariance == pytest.approx(expected, abs=1e-9)
+    more = disperse(answer, (0.01, 0.0), force_noise=0.2, samples=400, seed=1)
+    assert np.array_equal(more.position[:300], both.position)
+    assert not np.allclose(both.position[0], both.position[1])
+
+
 def test_each_error_has_random_numbers_of_its_own():
     answer = solve(TransferProblem(**PLAIN), order=2, steps=6)
 
