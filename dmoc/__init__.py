@@ -147,6 +147,7 @@ if TYPE_CHECKING:
     from dmoc.scene.team import Team as Team
     from dmoc.sensitivity.dispersion import Dispersion as Dispersion
     from dmoc.sensitivity.dispersion import disperse as disperse
+    from dmoc.sensitivity.feedback import feedback as feedback
     from dmoc.sensitivity.predict import predict as predict
     from dmoc.sensitivity.symmetries import Symmetry as Symmetry
     from dmoc.sensitivity.symmetries import symmetries as symmetries

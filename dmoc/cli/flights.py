@@ -18,6 +18,7 @@ from dmoc.cli.options import (
     attached,
     ends_at_once,
     problem_of,
+    switch,
     writable,
 )
 
@@ -52,6 +53,9 @@ def disperse(
     force_noise: Annotated[
         float, typer.Option(help="Standard deviation of a force in N, another one in each step.")
     ] = 0.0,
+    feedback: Annotated[
+        bool, switch("--feedback", help="Let the force answer how far a flight is off the plan.")
+    ] = False,
     samples: Annotated[int, typer.Option(help="Number of flights, at least 2.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same flights.")] = 0,
     plot: Annotated[Path | None, typer.Option(help="Draw the flights here (png, pdf or svg).")] = None,
@@ -64,7 +68,9 @@ def disperse(
     writable(plot, drawn=True)
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
-        found = dmoc.disperse(solution, _pair(start), force, pointing, mass, samples, seed, force_noise)
+        found = dmoc.disperse(
+            solution, _pair(start), force, pointing, mass, samples, seed, force_noise, feedback
+        )
     if plot is not None:
         from dmoc.charts.dispersion import dispersion_figure
         from dmoc.charts.study import save_page

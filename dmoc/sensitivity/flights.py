@@ -35,6 +35,7 @@ class Flights:
 
     problem: TransferProblem
     path: DiscretePath
+    gains: np.ndarray | None = None
 
     @property
     def axes(self) -> int:
@@ -96,8 +97,11 @@ class Flights:
         return len(self.path.mesh) - 1
 
     @cached_property
-    def _linear(self) -> tuple[np.ndarray, ca.DM, ca.DM]:
-        """States at the step ends of the planned path, and each step's slopes by its state and by its noise."""
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States at the step ends of the planned path, and each step's slopes by its state and by its noise.
+
+        Of shapes (steps+1, state), (steps, state, state) and (steps, state, axes).
+        """
         march, inputs = self._march()
         step, steps, still = self._step(), self.steps, np.zeros((self.axes, self.steps))
         states = np.zeros((self._state, steps + 1))
@@ -105,40 +109,51 @@ class Flights:
         states[:, 1:] = march(states[:, 0], *inputs, still)[0].full()
         given = [ca.MX.sym(f"w{i}", *step.size_in(i)) for i in range(step.n_in())]
         after = step(*given)[0]
-        both = [ca.jacobian(after, given[0]), ca.jacobian(after, given[-1])]
-        by_state, by_noise = ca.Function("jacobian", given, both).map(steps)(states[:, :-1], *inputs, still)
-        return states, ca.densify(by_state), ca.densify(by_noise)
+        both = [ca.densify(ca.jacobian(after, one)) for one in (given[0], given[-1])]
+        found = ca.Function("jacobian", given, both).map(steps)(states[:, :-1], *inputs, still)
+        along, across = (part.full().reshape(self._state, steps, -1).transpose(1, 0, 2) for part in found)
+        return states.T, along, across
+
+    @cached_property
+    def begin_slopes(self) -> np.ndarray:
+        """Derivatives of the state at the start by an error."""
+        first = ca.MX.sym("e", self.size)
+        slopes = ca.Function("start", [first], [ca.densify(ca.jacobian(self._begin()(first), first))])
+        return slopes(np.zeros(self.size)).full()
 
     def process(self, sigma: float) -> np.ndarray:
         """Covariance of positions and velocities by noise of the force, (steps+1, 2 axes, 2 axes).
 
         P <- A P A' + sigma^2 B B' with the Jacobians A and B of each step by its state and by its noise.
         """
-        states, along, across = self._linear
-        before, a = ca.MX.sym("P", self._state, self._state), ca.MX.sym("A", self._state, self._state)
-        b = ca.MX.sym("B", self._state, self.axes)
-        after = a @ before @ a.T + sigma**2 * (b @ b.T)
-        march = ca.Function("spread", [before, a, b], [after]).mapaccum(self.steps)
-        first = np.zeros((self._state, self._state))
-        found = np.hstack([first, march(first, along, across).full()])
-        table = found.reshape(self._state, self.steps + 1, self._state).transpose(1, 0, 2)
-        seen = self._of_velocity(states)
-        return seen @ table @ seen.transpose(0, 2, 1)
+        states, along, across = self.linear
+        found = [np.zeros((self._state, self._state))]
+        for a, b in zip(along, across, strict=True):
+            found.append(a @ found[-1] @ a.T + sigma**2 * (b @ b.T))
+        seen = self._of_velocity(states.T)
+        return seen @ np.array(found) @ seen.transpose(0, 2, 1)
 
     def slopes(self) -> np.ndarray:
         """Derivatives of positions and velocities at the step ends by an error, (steps+1, 2 axes, size).
 
         The product of the Jacobians of all steps up to there, each at the planned path.
         """
-        steps, (states, along, _) = self.steps, self._linear
+        states, along, _ = self.linear
         # S_(k+1) = A_k S_k, as P_(k+1) = A_k P_k A_k' for the covariance of a state that holds the errors too.
-        before, a = ca.MX.sym("S", self._state, self.size), ca.MX.sym("A", self._state, self._state)
-        product = ca.Function("product", [before, a], [a @ before]).mapaccum(steps)
-        first = ca.MX.sym("e", self.size)
-        start = ca.Function("start", [first], [ca.jacobian(self._begin()(first), first)])(np.zeros(self.size))
-        all_of = np.hstack([ca.densify(start).full(), product(start, along).full()])
-        table = all_of.reshape(self._state, steps + 1, self.size).transpose(1, 0, 2)
-        return self._of_velocity(states) @ table
+        found = [self.begin_slopes]
+        for a in along:
+            found.append(a @ found[-1])
+        return self._of_velocity(states.T) @ np.array(found)
+
+    def with_feedback(self, gains: np.ndarray) -> Flights:
+        """The same flights, whose force answers how far they are off the plan at the begin of each step."""
+        return replace(self, gains=gains)
+
+    def momentum_slopes(self) -> np.ndarray:
+        """Derivatives of position and momentum per mass by position and velocity at the begin of each step."""
+        n, states = self.axes, self.linear[0]
+        back = self._of_velocity(states.T)[:-1, :, : 2 * n]
+        return np.linalg.inv(back)
 
     @property
     def _state(self) -> int:
@@ -181,10 +196,16 @@ class Flights:
             force = force[at.T].reshape(at.size, self.axes)
         times = self.problem.start_time + path.duration * path.mesh[:-1]
         inputs = [path.mass[at], force.T, times[None], path.duration * np.diff(path.mesh)[None]]
+        if self.gains is not None:
+            planned = replace(self, gains=None).linear[0][:-1, : 2 * self.axes]
+            inputs += [planned.T, self.gains.transpose(1, 0, 2).reshape(self.axes, -1)]
         return self._step().mapaccum("flight", steps), inputs
 
     def _step(self) -> ca.Function:
-        """(state, masses, forces, t, h, noise) -> the state after a step, moves and velocities at its nodes."""
+        """(state, masses, forces, t, h, noise) -> the state after a step, moves and velocities at its nodes.
+
+        With feedback the planned position and momentum and the gains stand before the noise.
+        """
         n, rule, path = self.axes, self.rule, self.path
         state = ca.MX.sym("state", self._state)
         masses = ca.MX.sym("masses", rule.degree + 1)
@@ -193,7 +214,14 @@ class Flights:
         ends = np.cumsum([0, *self.parts.values()]).tolist()
         r, p, push, turn, heavier = ca.vertsplit(state, ends)
         dynamics = self.free
-        exerted = (1 + push) * (_turned(turn, n) @ forces) + ca.repmat(noise, 1, forces.shape[1])
+        answers = []
+        if self.gains is not None:
+            answers = [ca.MX.sym("planned", 2 * n), ca.MX.sym("gains", n, 2 * n)]
+            more = answers[1] @ (ca.vertcat(r, p) - answers[0])
+            commanded = forces + ca.repmat(more, 1, forces.shape[1])
+        else:
+            commanded = forces
+        exerted = (1 + push) * (_turned(turn, n) @ commanded) + ca.repmat(noise, 1, forces.shape[1])
         dq, dp, v = step_map(dynamics, rule, path.hold)(
             r, p, masses + path.mass[0] * heavier, exerted, t, h, path.position[0]
         )
@@ -206,7 +234,7 @@ class Flights:
         speeds = ca.vertcat(ca.vec(v[:, 1:-1]), speed)
         made = ca.Function(
             "step",
-            [state, masses, forces, t, h, noise],
+            [state, masses, forces, t, h, *answers, noise],
             [ca.vertcat(r + dq, p + dp, state[2 * n :]), moved, speeds],
         )
         return made.expand() if rule.degree == 1 and not dynamics.depends_on_velocity else made

@@ -532,6 +532,7 @@ CALLS = {
             "seed": 1,
         },
     ),
+    "feedback": (dmoc.feedback, {}),
     "foresee": (dmoc.foresee, {"unknown": "mass", "noise": 0.1, "every": 0.1}),
     "identify": (
         dmoc.identify,
