@@ -5,8 +5,8 @@ is, has the time that is left, and is warm started from the plan before, moved o
 robot is heavier than the planner believes and is pushed about; it moves in steps of 20 ms.
 
 Then the same with longer times between plans, each with and without a feedback in between: the exported
-`predict` says how force and state of the first plan move with its start, and so what force answers a robot that is
-off the plan.
+`predict` says how force and state of the first plan move with its start, and so what force answers a robot that
+is off the plan.
 
     ./scripts/run python scripts/closed_loop.py --plot closed_loop.png
 """

@@ -70,6 +70,14 @@ def sweep(
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
     keep: Keep = None,
+    error: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Also fly every answer with errors, as dmoc disperse does: start=0.01,0.001, force=0.01, "
+            "samples=200 and so on; repeat for more.",
+        ),
+    ] = None,
     workers: Workers = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
@@ -100,6 +108,7 @@ def sweep(
             settings=parse_settings(settings or ()),
             follow=follow,
             keep=keep,
+            errors=parse_settings(error, "--error") if error else None,
             workers=workers,
             scheduler=scheduler,
             restart=restart,
