@@ -126,11 +126,11 @@ if TYPE_CHECKING:
     from dmoc.parts.forces import BoxForce as BoxForce
     from dmoc.parts.forces import FreeForce as FreeForce
     from dmoc.parts.forces import Unpowered as Unpowered
-    from dmoc.parts.information import Information as Information
+    from dmoc.parts.largest import FinalHeight as FinalHeight
+    from dmoc.parts.largest import FinalRadius as FinalRadius
+    from dmoc.parts.largest import Information as Information
     from dmoc.parts.objectives import Effort as Effort
-    from dmoc.parts.objectives import FinalHeight as FinalHeight
     from dmoc.parts.objectives import FinalMass as FinalMass
-    from dmoc.parts.objectives import FinalRadius as FinalRadius
     from dmoc.parts.objectives import Fuel as Fuel
     from dmoc.parts.objectives import Objective as Objective
     from dmoc.parts.objectives import Time as Time

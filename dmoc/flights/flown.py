@@ -86,18 +86,10 @@ def fly(
     if (lost := number("dropped", dropped, "-", nonnegative=True)) >= 1:
         raise ValueError(f"dropped must be less than 1 [-]; got {lost:g}")
     whole("seed", seed, least=0)
-    problem = TransferProblem(
-        mass,
-        start,
-        start,
-        float(clock[-1] - clock[0]),
-        effects=effects,
-        actuator=FreeForce() if actuator is None else actuator,
-        start_time=float(clock[0]),
-        inertia=inertia,
-    )
-    stated = forces if callable(forces) or np.ndim(forces) < 2 else np.asarray(forces)
-    given = _at_times("forces", stated, clock, len(force_labels(problem)))
+    lasts, begins = float(clock[-1] - clock[0]), float(clock[0])
+    actuator = FreeForce() if actuator is None else actuator
+    problem = TransferProblem(mass, start, start, lasts, effects, actuator, start_time=begins, inertia=inertia)
+    given = _at_times("forces", forces, clock, len(force_labels(problem)))
     commands = with_throttle(given, problem)
     kinds = ("positions", "force", "velocities", "attitudes", "rates", "lost")
     random = {kind: np.random.default_rng([seed, i]) for i, kind in enumerate(kinds)}

@@ -14,7 +14,7 @@ from dmoc.identification.estimate import Estimate
 from dmoc.nlp.placement import fisher
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
-from dmoc.parts.information import MASS, Information, constants_of
+from dmoc.parts.largest import MASS, Information, constants_of
 from dmoc.results.solution import Outcome, Solution
 from dmoc.scene.problem import TransferProblem
 

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.nlp.layout import Layout, Limit
-from dmoc.parts.information import AXES, MASS, constants_of
+from dmoc.parts.largest import AXES, MASS, constants_of
 from dmoc.parts.rows import Row
 
 # The groups of unknowns, and of the rows that say what they are.

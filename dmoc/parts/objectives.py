@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import casadi as ca
-
-from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
+from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Duties
 from dmoc.parts.actuator import Actuator
 
@@ -176,62 +174,6 @@ class FinalMass(Objective):
 
     def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
         return m
-
-
-@dataclass(frozen=True)
-class FinalRadius(Objective):
-    """Largest distance from a centre at the goal [m].
-
-    Parameters
-    ----------
-    center : sequence of float, optional
-        [m]; the origin if not given.
-    """
-
-    center: Vector | None = None
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[int] = -1
-    moves_body: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if self.center is not None:
-            checked(self, center=vector("center", self.center, "m"))
-
-    def check_dimension(self, dimension: int) -> None:
-        if self.center is not None and len(self.center) != dimension:
-            raise ValueError(
-                f"FinalRadius: center has {len(self.center)} entries but the problem has {dimension} dimensions"
-            )
-
-    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        offset = q if self.center is None else q - ca.DM(self.center)
-        return ca.sqrt(ca.dot(offset, offset))
-
-
-@dataclass(frozen=True)
-class FinalHeight(Objective):
-    """Largest coordinate along one axis at the goal [m].
-
-    Parameters
-    ----------
-    axis : int
-        Which one, counted from 0; the last if not given.
-    """
-
-    axis: int = -1
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[int] = -1
-    moves_body: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        checked(self, axis=whole("FinalHeight: axis", self.axis, least=-3))
-
-    def check_dimension(self, dimension: int) -> None:
-        if self.axis not in range(-dimension, dimension):
-            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {short(self.axis)}")
-
-    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        return q[self.axis]
 
 
 @dataclass(frozen=True)

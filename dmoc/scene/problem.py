@@ -21,7 +21,7 @@ from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
-from dmoc.parts.information import learned_opened
+from dmoc.parts.largest import learned_opened
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.basics.arguments import short
 from dmoc.basics.compiled import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
 from dmoc.sweeps.data import FLIGHTS, PATH, as_attributes, sweep_dataset, write_sweep
@@ -158,7 +159,7 @@ def _errors(given: Mapping[str, Any] | None) -> dict[str, Any] | None:
 
     names = [name for name in signature(disperse).parameters if name != "solution"]
     if strange := [name for name in given if name not in names]:
-        raise ValueError(f"no error is called {strange[0]!r}; there are {', '.join(names)}")
+        raise ValueError(f"no error is called {short(strange[0])}; there are {', '.join(names)}")
     return dict(given)
 
 

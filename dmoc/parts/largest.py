@@ -1,4 +1,4 @@
-"""Information: the objective of flights that teach what a number is."""
+"""Objectives that are maximised: how far or high the goal is, and what a flight tells of unknown numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 
-from dmoc.basics.arguments import checked, entries, number, short
+from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
 from dmoc.basics.unknown import at, numeric_fields, opened
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import title
@@ -16,6 +16,62 @@ from dmoc.parts.rows import title
 AXES = ("x", "y", "z")
 # The number of a problem that is no constant of an effect.
 MASS = "mass"
+
+
+@dataclass(frozen=True)
+class FinalRadius(Objective):
+    """Largest distance from a centre at the goal [m].
+
+    Parameters
+    ----------
+    center : sequence of float, optional
+        [m]; the origin if not given.
+    """
+
+    center: Vector | None = None
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+    moves_body: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.center is not None:
+            checked(self, center=vector("center", self.center, "m"))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.center is not None and len(self.center) != dimension:
+            raise ValueError(
+                f"FinalRadius: center has {len(self.center)} entries but the problem has {dimension} dimensions"
+            )
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        offset = q if self.center is None else q - ca.DM(self.center)
+        return ca.sqrt(ca.dot(offset, offset))
+
+
+@dataclass(frozen=True)
+class FinalHeight(Objective):
+    """Largest coordinate along one axis at the goal [m].
+
+    Parameters
+    ----------
+    axis : int
+        Which one, counted from 0; the last if not given.
+    """
+
+    axis: int = -1
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[int] = -1
+    moves_body: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        checked(self, axis=whole("FinalHeight: axis", self.axis, least=-3))
+
+    def check_dimension(self, dimension: int) -> None:
+        if self.axis not in range(-dimension, dimension):
+            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {short(self.axis)}")
+
+    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
+        return q[self.axis]
 
 
 @dataclass(frozen=True)
@@ -124,7 +180,7 @@ def learned_opened(problem: Any) -> tuple[Any, ...]:
     for name in names:
         if name != MASS and name not in known:
             raise ValueError(
-                f"Information: no number is called {name!r}; there are {', '.join([MASS, *known])}"
+                f"Information: no number is called {short(name)}; there are {', '.join([MASS, *known])}"
             )
         if name != MASS and not known[name].value:
             raise ValueError(
