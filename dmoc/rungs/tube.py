@@ -51,7 +51,7 @@ class _Tube(Constraint):
 
 
 def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | None:
-    """The problem with a tube around a guess, where that helps from the first: limited forces, many revolutions.
+    """The problem with a tube around a guess, where that helps: limited forces, many revolutions.
 
     From a guess alone Ipopt's first steps go far; over many revolutions that leads to places from which it
     takes a thousand iterations to come back, or to another optimum. Of 16 guesses and meshes of `dionysus`
