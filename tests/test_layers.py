@@ -28,6 +28,7 @@ LAYERS = [
     ["nlp"],
     ["meshes"],
     ["diagnosis"],
+    ["rungs"],
     ["solver", "checks"],
     ["chains"],
     ["missions"],

@@ -13,9 +13,9 @@ from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
+from dmoc.rungs.rung import HELD, Rung, let_go, rounded
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import WIDER, Ladder
-from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest
 # thrust, and the path of least effort no more than this part of that thrust [-]: where it takes more, least
