@@ -36,6 +36,8 @@ ACCURATE, MOST_MENDED = 1e-5, 3
 SHARP = 1e-12
 # There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
 STAYING = 1.0
+# Where the cost hardly depends on where legs end the path stays nearer: Ipopt would else leave the valley.
+VALLEY = 1e-2
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -70,6 +72,9 @@ class Climb:
     program: Any = MissionProgram
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
+    # How near to limits, and with which parameter of the barrier, finer meshes are begun without multipliers,
+    # where the cost hardly depends on where legs end; None where they are begun with them.
+    valley: tuple[float, float] | None = None
 
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
@@ -103,7 +108,7 @@ class Climb:
             limits["ipopt.tol"] = SHARP
         if near is not None:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
-            limits["ipopt.theta_max_fact"] = STAYING
+            limits["ipopt.theta_max_fact"] = STAYING if self.valley is None else VALLEY
         built = time.perf_counter() - begun
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
@@ -205,8 +210,8 @@ class Climb:
             onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
-            found = self.attempt(onto, carried=True)
-            if not found.solved and found.answer.status != "stopped":
+            found = self.on_finer(onto)
+            if not found.solved and found.answer.status != "stopped" and self.valley is None:
                 found = self.attempt(cold(onto), carried=True)
             if found.answer.status == "stopped":
                 return found, error, False
@@ -220,6 +225,12 @@ class Climb:
                 if error.largest <= tol:
                     return attempt, error, True
         return attempt, error, tol is None
+
+    def on_finer(self, onto: MissionPath, most: int | None = None) -> Attempt:
+        """The answer on finer meshes, from that on coarser ones."""
+        if self.valley is None:
+            return self.attempt(onto, carried=True, most=most)
+        return self.attempt(cold(onto), near=self.valley, most=MOST_TRYING * 2)
 
     def largest_error(self, attempt: Attempt) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""

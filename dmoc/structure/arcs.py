@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,6 +90,34 @@ def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
         part = switch(problem, path, node)
         found.append((str(kinds[node]), float(at[node] + part * (at[node + 1] - at[node]))))
     return [*found, (str(kinds[-1]), 1.0)]
+
+
+def surely_seen(arcs: tuple[Arc, ...], solution: Solution) -> tuple[Arc, ...]:
+    """The arcs without those, but for the first and the last one, that are shorter than from node to node.
+
+    They may be none; those that are missing then are found by the switching function.
+    """
+    left, spacing = list(arcs), 1.0 / (len(solution.path.fractions) - 1)
+    while len(left) > 2:
+        lengths = np.diff([arc.end for arc in left[:-1]])
+        place = int(np.argmin(lengths))
+        if lengths[place] >= spacing:
+            break
+        before, short = left[place], left.pop(place + 1)
+        left[place] = before._replace(end=short.end, touches=before.touches or short.touches)
+        left = list(joined(left))
+    return tuple(left)
+
+
+def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
+    """Neighbours that are alike, and have no touch between them, are one arc."""
+    left: list[Arc] = []
+    for arc in arcs:
+        if left and left[-1].alike == arc.alike and left[-1].touches is None:
+            left[-1] = arc
+        else:
+            left.append(arc)
+    return tuple(left)
 
 
 def spans_of(path: DiscretePath, acts: np.ndarray) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, spans_of
+from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, joined, spans_of
 from dmoc.structure.modes import lacking, names_of
 from dmoc.structure.surfaces import NEAR, pierced, room, touched
 
@@ -118,17 +118,6 @@ def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSol
         one._replace(touches=None) if one.follows and one.alike == two.alike else one
         for one, two in zip(left, [*left[1:], left[-1]._replace(kind="")], strict=True)
     )
-
-
-def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
-    """Neighbours that are alike, and have no touch between them, are one arc."""
-    left: list[Arc] = []
-    for arc in arcs:
-        if left and left[-1].alike == arc.alike and left[-1].touches is None:
-            left[-1] = arc
-        else:
-            left.append(arc)
-    return tuple(left)
 
 
 def _wrong(arcs: tuple[Arc, ...], index: int, leg: Solution) -> np.ndarray:

@@ -14,7 +14,7 @@ from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Climb, solve_mission
 from dmoc.scene.problem_file import load_problem
 from dmoc.structure import solve as structure
-from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain
+from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain, surely_seen
 from dmoc.structure.build import mission_of, path_of
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
@@ -85,6 +85,22 @@ def test_a_halo_orbit_left_and_another_reached():
     assert found.success and len(found.legs) == 7
     assert found.final_mass == pytest.approx(0.984537, abs=5e-7)
     assert dmoc.verify(found).ok
+
+
+@pytest.mark.slow
+def test_five_burns_whose_begins_hardly_matter():
+    found = dmoc.solve(gallery("leo_raise"), structure=True)
+    assert found.success and kinds(found) == [COAST, BURN] * 5
+    # 48 steps of order 6 and 32 of order 8 agree to 2e-7 kg.
+    assert found.objective == pytest.approx(6.6802297, abs=5e-7)
+    assert dmoc.verify(found).ok
+
+
+def test_arcs_shorter_than_from_node_to_node_are_not_seen_for_sure():
+    coarse = dmoc.solve(gallery("two_body_fuel"), order=4, steps=20)
+    ends = [(BURN, 0.2), (COAST, 0.5), (BURN, 0.51), (COAST, 0.7), (BURN, 1.0)]
+    seen = surely_seen(tuple(Arc(*end) for end in ends), coarse)
+    assert [(arc.kind, arc.end) for arc in seen] == [(BURN, 0.2), (COAST, 0.7), (BURN, 1.0)]
 
 
 @pytest.mark.slow
