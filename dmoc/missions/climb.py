@@ -19,7 +19,7 @@ from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
-from dmoc.results.estimate import local_errors
+from dmoc.results.estimate import left_after, local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
@@ -72,8 +72,7 @@ class Climb:
     program: Any = MissionProgram
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
-    # How near to limits, and with which parameter of the barrier, finer meshes are begun without multipliers,
-    # where the cost hardly depends on where legs end; None where they are begun with them.
+    # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
@@ -204,15 +203,13 @@ class Climb:
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
-            rest = _left(changes) if changes else 0.0
+            rest = left_after(changes) if changes else 0.0
             if tol is None and _largest(errors) <= accurate and rest <= still:
                 break
             onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)
-            if not found.solved and found.answer.status != "stopped" and self.valley is None:
-                found = self.attempt(cold(onto), carried=True)
             if found.answer.status == "stopped":
                 return found, error, False
             if not found.solved:
@@ -228,9 +225,12 @@ class Climb:
 
     def on_finer(self, onto: MissionPath, most: int | None = None) -> Attempt:
         """The answer on finer meshes, from that on coarser ones."""
-        if self.valley is None:
-            return self.attempt(onto, carried=True, most=most)
-        return self.attempt(cold(onto), near=self.valley, most=MOST_TRYING * 2)
+        if self.valley is not None:
+            return self.attempt(cold(onto), near=self.valley, most=2 * MOST_TRYING)
+        found = self.attempt(onto, carried=True, most=most)
+        if found.solved or found.answer.status == "stopped" or most is not None:
+            return found
+        return self.attempt(cold(onto), carried=True)
 
     def largest_error(self, attempt: Attempt) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
@@ -241,7 +241,7 @@ class Climb:
         path, missed = attempt.path, 0.0
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
-        return Error(summed, _left(changes), missed)
+        return Error(summed, left_after(changes), missed)
 
     def _errors(self, attempt: Attempt) -> list[np.ndarray]:
         path = attempt.path
@@ -291,13 +291,6 @@ def _change(coarse: Attempt, fine: Attempt) -> float:
     """What the objective changes from mesh to mesh, of itself [-]."""
     scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
     return abs(fine.level.objective - coarse.level.objective) / scale
-
-
-def _left(changes: list[float]) -> float:
-    """The error left after the last change: as much as it, or less where changes fall fast."""
-    last = changes[-1]
-    fall = changes[-2] / last if len(changes) > 1 and last > 0 else 0.0
-    return last / (fall - 1) if fall > 2 else last
 
 
 def _rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:

@@ -8,7 +8,20 @@ import numpy as np
 import pytest
 
 import dmoc
-from dmoc import BoxForce, Engine, Fuel, KeepIn, Leg, Mission, State, TransferProblem, UniformGravity
+from dmoc import (
+    BallForce,
+    BoxForce,
+    Engine,
+    Fuel,
+    KeepIn,
+    Leg,
+    Mission,
+    SpeedLimit,
+    State,
+    Time,
+    TransferProblem,
+    UniformGravity,
+)
 from dmoc.missions.answer import answered
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Climb, solve_mission
@@ -190,6 +203,55 @@ def test_a_way_along_a_limit_is_undercut_at_order_2_alone():
     assert np.log2((4.0 - rough[0].objective) / (4.0 - rough[1].objective)) > 1.7
     for order in (4, 6, 8):
         assert solve_mission(found.problem, order, 10, guess=found).objective == pytest.approx(4.0, rel=1e-12)
+
+
+def sped(limit, duration, **more):
+    """One metre from rest to rest, never faster than a limit."""
+    ends = State((0.0,), (0.0,)), State((1.0,), (0.0,))
+    return TransferProblem(1.0, *ends, duration, constraints=[SpeedLimit(limit)], **more)
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 20), (2, 60), (8, 12)])
+def test_the_least_effort_below_a_speed_is_exact(order, steps):
+    """The force falls linearly to zero where the speed is reached: 2 v / (3 t) is what is lost of the way."""
+    found = dmoc.solve(sped(1.2, 1.0), order, steps, structure=True)
+    rising = 1.5 * (1 - 1 / 1.2)
+    assert found.success and found.reason == "3 legs: arc 0.25 s, along a limit 0.5 s, arc 0.25 s"
+    assert found.legs[0].duration == pytest.approx(rising, rel=1e-9)
+    assert found.objective == pytest.approx((2 * 1.2 / rising) ** 2 * rising / 3, rel=1e-12)
+    assert found.legs[1].velocity == pytest.approx(1.2, abs=1e-12)
+    assert found.legs[1].path.control[:, 0] == pytest.approx(0.0, abs=1e-9)
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 20), (2, 60)])
+def test_the_least_time_below_a_speed_is_exact(order, steps):
+    problem = sped(0.6, (0.1, 10.0), actuator=BoxForce(1.0), objective=Time())
+    found = dmoc.solve(problem, order, steps, structure=True)
+    assert found.success and kinds(found) == ["+x", FREE, "-x"]
+    assert [leg.duration for leg in found.legs] == pytest.approx([0.6, 1 / 0.6 - 0.6, 0.6], rel=1e-12)
+    assert found.objective == pytest.approx(1 / 0.6 + 0.6, rel=1e-13)
+    assert dmoc.verify(found).ok
+
+
+def test_a_speed_and_a_force_at_their_limits_in_the_plane():
+    ends = State((0, 0), (0, 0)), State((1, 0.5), (0, 0))
+    limits = {"actuator": BallForce(3.5), "constraints": [SpeedLimit(0.95)]}
+    problem = TransferProblem(1.0, *ends, 1.5, effects=[UniformGravity((0, -1))], **limits)
+    found = dmoc.solve(problem, structure=True)
+    assert found.success and kinds(found) == ["full force", FREE, FREE, FREE, "full force"]
+    # The forces of both sides are alike where the speed is reached, and where it is left.
+    for one, two in zip(found.legs[1:3], found.legs[2:4], strict=True):
+        assert two.path.control[0] == pytest.approx(one.path.control[-1], abs=1e-9)
+    speed = np.linalg.norm(found.legs[2].velocity, axis=1)
+    # It is kept to at the Gauss points of the steps; the speeds at their ends come from momenta.
+    assert speed == pytest.approx(0.95, abs=1e-6)
+    assert found.objective == pytest.approx(dmoc.solve(problem, tol=1e-5, structure=False).objective, rel=1e-5)
+    assert dmoc.verify(found).ok
+
+
+def test_a_speed_that_is_not_reached_makes_no_leg():
+    assert not hasattr(dmoc.solve(sped(1.6, 1.0), structure=True), "legs")
 
 
 def test_an_empty_leg_is_dropped():
