@@ -462,7 +462,15 @@ REFUSED = {
     "structure and impulses": lambda: solve(Team([ONE, TWO]), structure=True),
     "use dmoc.simulate_team": lambda: dmoc.simulate(Team([ONE, TWO])),
     "team must be a dmoc.Team": lambda: dmoc.simulate_team(ONE),
-    "a team of bodies is not exported": lambda: dmoc.export(Team([ONE, TWO]), "nowhere"),
+    "solution must be a TeamSolution; got 3": lambda: dmoc.simulate_team(Team([ONE, TWO]), 3),
+    "solution must be a TeamSolution; got .Solution": lambda: dmoc.simulate_team(
+        Team([ONE, TWO]), [solve(ONE, steps=2)]
+    ),
+    "team 'team' is of body 1, body 2, the solution of": lambda: dmoc.simulate_team(
+        Team([ONE, TWO]), solve(Team([ONE, TWO], names=("a", "b")), steps=2)
+    ),
+    "hold must be True or False; got 3": lambda: dmoc.simulate_team(Team([ONE, TWO]), hold=3),
+    "guess must be a function of the time": lambda: dmoc.export(Team([ONE, TWO]), "nowhere", guess=["x", "y"]),
     "a check of a name that is taken": lambda: verify(solve(Team([ONE, TWO]), steps=2), more=[twin]),
     "no body is called 'x'; there": lambda: solve(Team([ONE, TWO]), steps=2).of("x"),
 }
