@@ -54,7 +54,7 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
 
 
 def write_mission_code(planner: MissionPlanner, functions: Sequence[Exported], folder: Path) -> None:
-    """functions.c, functions.h and mission.h (of a team team.h) of steps, rollouts and residual, in a folder."""
+    """functions.c, functions.h and mission.h or team.h of steps, rollouts and residual, in a folder."""
     _generate(functions, folder)
     sizes: dict[str, tuple[int, str]] = {}
     for name, words, scene in zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True):

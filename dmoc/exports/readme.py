@@ -87,8 +87,8 @@ The solver always returns, whatever its status. A plan can be flown if `largest_
 (of rows and bounds, scaled) are small; that it is an optimum only the status says. `residual` gives the same
 for any path: what is left of the rows of each {stretch} and of {others}, 0 where they hold.
 
-`step_{leg}` is one step of a {stretch} for any step length, `rollout_{leg}` all of its steps, on the mesh that the
-manifest lists. {between}
+`step_{leg}` is one step of a {stretch} for any step length, `rollout_{leg}` all of its steps, on the mesh that
+the manifest lists. {between}
 
 To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too. What
 is no input of the solver is fixed in it: {fixed}.
@@ -97,8 +97,8 @@ An attitude at start or goal must have the sign that the guess has there.
 
 JOINTS = {
     "others": "each joint",
-    "between": """What happens between legs, such as an impulse, stands in the plan: add it to the velocity before
-the next rollout.""",
+    "between": """What happens between legs, such as an impulse, stands in the plan: add it to the
+velocity before the next rollout.""",
     "fixed": """what events are made of, such as the limit of an impulse or a mass
 that is dropped, the meshes, and which impulses are none""",
 }

@@ -14,6 +14,7 @@ from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Answer, Interrupt, Watch
 from dmoc.missions.answer import answered, straightened
+from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
@@ -82,8 +83,8 @@ class Climb:
         self.levels: list[Level] = []
         # The last attempt that solved the mission itself, not one whose |F| is rounded more widely.
         self.held: Attempt | None = None
-        # What is in the way, where no attempt succeeded.
-        self.reason = ""
+        # What is in the way, where no attempt succeeded, and what another start led to.
+        self.reason = self.told = ""
 
     def attempt(
         self,
@@ -137,12 +138,11 @@ class Climb:
 
     def from_guess(self, path: MissionPath) -> Attempt:
         """The first answer: |F| rounded widely at first, and other durations where that fails."""
-        stages = self._stages()
-        tried = self._staged(path, stages)
+        tried = self.staged(path)
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
         for factor in OTHER_DURATIONS:
-            other = self._staged(path.stretched(self.mission, factor), stages)
+            other = self.staged(path.stretched(self.mission, factor))
             if other.solved or other.answer.status == "stopped":
                 return other
         return tried
@@ -153,10 +153,11 @@ class Climb:
             return failed
         starts = path, cold(failed.path)
         near, self.reason = mission_cause(failed.program, starts, self.levels.append, self.interrupt)
-        return failed if near is None else self._staged(near, self._stages())
+        return failed if near is None else self.staged(near)
 
-    def _staged(self, path: MissionPath, stages: list[float | None]) -> Attempt:
-        for i, width in enumerate(stages):
+    def staged(self, path: MissionPath) -> Attempt:
+        """An answer from a path that may be far from it, with |F| rounded widely at first."""
+        for i, width in enumerate(self._stages()):
             tried = self.attempt(path, width, MOST_TRYING, carried=i > 0)
             if not tried.solved:
                 return tried
@@ -276,6 +277,8 @@ def solve_mission(
             first = climb.explained(path, first)
         if not first.solved:
             return answered(climb, first)
+        if not path.warm and guess is None:
+            first = with_best_drops(climb, first, lambda one: first_path(one, order, steps, hold, None))
         first = straightened(climb, first, MOST_TRYING)
         first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
         if steps is not None and tol is None:

@@ -20,8 +20,8 @@ from dmoc.teams.program import TeamProgram
 class TeamPlanner(MissionPlanner):
     """The program of a team, and what its functions need to speak SI units.
 
-    Bodies stand beside each other as legs do one after the other; mass at the start, start time and a duration that
-    is fixed are numbers, not unknowns.
+    Bodies stand beside each other as legs do one after the other; mass at the start, start time and a duration
+    that is fixed are numbers, not unknowns.
     """
 
     kind = "team"

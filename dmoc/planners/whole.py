@@ -1,4 +1,4 @@
-"""The functions of a mission or team: step and rollout of each leg or body, residual, cost and solver of all."""
+"""The functions of a mission or team: step and rollout of each leg or body, the rest of all together."""
 
 from __future__ import annotations
 

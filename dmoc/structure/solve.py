@@ -128,13 +128,16 @@ def _by_arcs(
         found = _improved(climb, problem, arcs, legs, tol, most)
     if found is None or found.status in ENDED:
         return found
-    return found if found.optimal and _is_settled(found) and verdict(found).ok else None
+    return found if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok else None
 
 
-def _is_settled(found: MissionSolution) -> bool:
-    """Whether the last two meshes of one order agree on the objective, unless the tolerance has been met."""
+def _is_settled(found: MissionSolution, coarse: int) -> bool:
+    """Whether the last two meshes of one order agree on the objective, unless the tolerance has been met.
+
+    The first `coarse` levels of the ladder are those of the coarse answer.
+    """
     last = found.ladder[-1]
-    same = [level for level in found.ladder if level.order == last.order and level.status == "solved"]
+    same = [level for level in found.ladder[coarse:] if level.order == last.order and level.status == "solved"]
     if found.tolerance is not None or len(same) < 2 or last.order == FOUND_ORDER:
         return True
     return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)

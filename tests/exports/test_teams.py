@@ -1,4 +1,4 @@
-"""Exported teams: the solver answers as `solve` does, for other numbers too, and bodies step as they are flown."""
+"""Exported teams: the solver answers as `solve` does, for other numbers too, and bodies step as flown."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_a_singular_arc_has_one_polynomial_for_its_force():
     assert dmoc.verify(found).ok
 
 
-@pytest.mark.parametrize(("order", "steps"), [(4, 10), (4, 20), (2, 60), (8, 12)])
+@pytest.mark.parametrize(("order", "steps"), [(4, 10), (4, 20), (2, 60), (8, 12), (8, 25)])
 def test_a_way_along_a_limit(order, steps):
     found = dmoc.solve(bryson_denham(), order, steps, structure=True)
     assert found.success and len(found.legs) == 3
