@@ -125,6 +125,8 @@ def export(
     kind: Any = Mission if hasattr(problem, "joints") else TransferProblem
     kind = Team if hasattr(problem, "together") else kind
     of_kind("problem", problem, kind)
+    if problem.objective.learns:
+        raise ValueError("a plan with Information has no exported functions; export it with another objective")
     hold, c = flag("hold", hold), flag("c", c)
     target = _checked_folder(as_path(folder))
     made = {Mission: partial(_of_mission, MissionPlanner), Team: partial(_of_mission, TeamPlanner)}
