@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from dmoc.cli.options import Json, Name, Settings, ends_at_once, not_a_team, switch, writable
+from dmoc.cli.pages import Dark
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -41,6 +42,7 @@ def study(
     ] = None,
     settings: Settings = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time here (png, pdf or svg).")] = None,
+    dark: Dark = False,
     csv: Annotated[Path | None, typer.Option(help="Write a line a solve here.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -61,11 +63,12 @@ def study(
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
         problem = not_a_team(name, settings, "study")
         methods = {} if against is None else load_methods(against)
-        told = live.update if live else None
         measured = _of_mission if hasattr(problem, "plan") else work_precision
-        trials = measured(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
+        trials = measured(
+            problem, chosen, meshes, repeats, methods, reference, cold, compiled, live and live.update
+        )
     if plot is not None:
-        save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time")
+        save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time", dark)
     if csv is not None:
         report_study.write_csv(trials, csv)
     if as_json:

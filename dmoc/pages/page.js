@@ -235,6 +235,7 @@ const stage = {
       const stops = scaled.map(([at, of]) => `<stop offset="${at}" stop-color="${themed(of)}"/>`).join("");
       return `<svg viewBox="0 0 22 9"><defs><linearGradient id="force">${stops}</linearGradient></defs><rect y="2" width="22" height="5" rx="2" fill="url(#force)"/></svg>`;
     }
+    if (trace.type === "mesh3d") return swatch({ colour: trace.color, fill: true });
     if (trace.type === "surface") return swatch({ colour: trace.colorscale[0][1], fill: true });
     if (trace.fill) return swatch({ colour: trace.fillcolor, fill: true });
     if (trace.mode === "markers") return swatch({ colour: trace.marker.color, dash: "none", symbol: trace.marker.symbol });
@@ -253,10 +254,11 @@ const stage = {
       update[name] = moving.map(({ frames }) => frames[Math.min(frame, frames.length - 1)].map((point) => point[i]));
     });
     if (moving.length) Plotly.restyle(this.place, update, this.moving);
+    const reach = Math.max(...shown.stage.view.flat().map(Math.abs));
     const bodies = moving.filter(({ mode }) => mode === "markers");
     const words = bodies.slice(0, 4).map(({ name, frames }) => {
       const [place] = frames[frame];
-      return `${bodies.length > 1 ? name : "at"} (${place.map(told).join(", ")})`;
+      return `${bodies.length > 1 ? name : "at"} (${place.map((value) => told(value, reach)).join(", ")})`;
     });
     document.getElementById("place").innerHTML = words.length && unit ? `${words.join("   ")} ${unit}` : "";
   },
