@@ -50,7 +50,6 @@ def study(
 
     Medians of several runs; whatever else the computer does makes them longer.
     """
-    from dmoc.charts.study import save_study
     from dmoc.reports import study as report_study
     from dmoc.reports import words as report
     from dmoc.studies.accuracy import work_precision
@@ -64,11 +63,10 @@ def study(
         problem = not_a_team(name, settings, "study")
         methods = {} if against is None else load_methods(against)
         measured = _of_mission if hasattr(problem, "plan") else work_precision
-        trials = measured(
-            problem, chosen, meshes, repeats, methods, reference, cold, compiled, live and live.update
-        )
+        told = live.update if live else None
+        trials = measured(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
-        save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time", dark)
+        _draw(trials, problem.name.replace("_", " "), plot, dark)
     if csv is not None:
         report_study.write_csv(trials, csv)
     if as_json:
@@ -81,6 +79,12 @@ def study(
     console.print(report_study.study_tables(trials, unit, console.width))
     for path in filter(None, (plot, csv)):
         console.print(f"wrote {path}")
+
+
+def _draw(trials: list, name: str, path: Path, dark: bool) -> None:
+    from dmoc.charts.study import save_study
+
+    save_study(trials, path, f"{name}: what accuracy costs in time", dark)
 
 
 def _of_mission(
