@@ -298,7 +298,11 @@ def test_utc_is_that_of_astropy():
 @pytest.mark.parametrize(
     "of, given, told",
     [
-        ("transfer", {"to": "oem"}, "an OEM needs the date of t = 0, .* give epoch"),
+        (
+            "transfer",
+            {"to": "oem"},
+            "an OEM needs the date of t = 0, the axes and the body at the origin, .* give epoch .* and center",
+        ),
         ("transfer", {"to": "oem", "epoch": "2028-11-20"}, "needs the axes, .* give frame"),
         (
             "transfer",
