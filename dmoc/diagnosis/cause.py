@@ -267,7 +267,9 @@ def _rows(transfer: Relaxable) -> Cause:
     owners = [layout.group_at(i).owner for i in worst]
     blamed = any(owner is not None and owner.field == "constraints" for owner in owners)
     names = tuple(layout.name_of(i) for i in worst)
-    return (_zones(transfer) if blamed else None) or Cause(rows=names, turns=transfer.problem.actuator.turns_every_way)
+    return (_zones(transfer) if blamed else None) or Cause(
+        rows=names, turns=transfer.problem.actuator.turns_every_way
+    )
 
 
 def _zones(transfer: Relaxable) -> Cause | None:

@@ -202,7 +202,9 @@ const stage = {
         yaxis: { ...axis(), range: view[1], title: label("y"), zeroline: false, scaleanchor: "x" },
       };
     }
-    const grow = 1.4 / Math.hypot(...shape), rise = (flat ? 48 : 24) * Math.PI / 180, side = -Math.PI / 3, far = 1.75;
+    // On a narrow screen the letters take more of the room, so that the box is seen from further away.
+    const far = this.place.clientWidth < 500 ? 2.2 : 1.75;
+    const grow = 1.4 / Math.hypot(...shape), rise = (flat ? 48 : 24) * Math.PI / 180, side = -Math.PI / 3;
     const eye = { x: far * Math.cos(rise) * Math.cos(side), y: far * Math.cos(rise) * Math.sin(side), z: far * Math.sin(rise) };
     const wall = (name, i) => ({ ...axis(), gridcolor: colour("edge"), range: view[i], title: label(name), showbackground: false, showspikes: false, nticks: 2 + Math.round(4 * shape[i]) });
     return {
