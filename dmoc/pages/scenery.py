@@ -78,7 +78,7 @@ def _region(region: Region, view: Corners, size: float, zone: str) -> list[dict[
         # matplotlib leaves out points that are near each other in pixels, which these places are not in
         path.should_simplify = False
     if region.held:
-        lines = apart([part for path in paths for part in path.to_polygons(closed_only=False)])
+        lines = apart([np.asarray(part) for path in paths for part in path.to_polygons(closed_only=False)])
         return [line(within(lines, view) / size, region.name, PALE, 2)]
     edges = apart([np.asarray(edge) for path in paths for edge in path.to_polygons()])
     return [_area(edges / size, zone, region.name, CLEAR)]

@@ -51,8 +51,7 @@ def draw_scene(axes: Any, solution: Solution, view: Corners, size: float) -> lis
     for region in regions(solution):
         if (draw_region if solution.dimension == 2 else _draw_surface)(axes, region, view, size):
             colour = PALE if region.held else FORBIDDEN
-            look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.5}
-            proxies.append(Patch(label=region.name, **look))
+            proxies.append(Patch(facecolor=colour, edgecolor=colour, alpha=0.5, label=region.name))
     for i, way in enumerate(ways(solution)):
         line = within(way.points / size, view)
         axes.plot(*line.T, color=PALE, linewidth=1.0, linestyle=WAYS[i % len(WAYS)], label=way.name, zorder=1)

@@ -66,8 +66,9 @@ def _near(solution: Solution, near: np.ndarray, far: np.ndarray) -> list[Corners
         inside = np.argwhere((region.values(places.reshape(-1, len(marks))) > 0).reshape(places.shape[:-1]))
         if len(inside) and inside.min() > 0 and inside.max() < COARSE - 1:
             # its edge is up to a place of the grid further out
-            ends = inside.min(axis=0) - 1, inside.max(axis=0) + 1
-            found.append(tuple(np.array([side[i] for side, i in zip(marks, end, strict=True)]) for end in ends))
+            low, high = inside.min(axis=0) - 1, inside.max(axis=0) + 1
+            corner, opposite = ([side[i] for side, i in zip(marks, end, strict=True)] for end in (low, high))
+            found.append((np.array(corner), np.array(opposite)))
     return found
 
 

@@ -25,9 +25,11 @@ from dmoc import (
     TransferProblem,
     convert,
     load,
+    simulate,
     solve,
 )
 from dmoc.cli.app import main
+from dmoc.conversions.marched import marched_columns, write_marched
 from dmoc.planets.dates import utc_of
 from dmoc.scene.problem_file import load_problem
 
@@ -140,6 +142,21 @@ def test_a_leg_without_a_column_has_empty_cells(tmp_path):
     with (tmp_path / "path.csv").open(newline="") as file:
         throttles = [row["control throttle [N]"] for row in csv.DictReader(file)]
     assert throttles[5:] == [""] * 5 and all(np.isfinite([float(cell) for cell in throttles[:5]]))
+
+
+def test_a_marched_path_is_a_table(turning, tmp_path):
+    """Of a body that turns, by the torques of an answer."""
+    marched = simulate(turning.problem, turning)
+    columns = marched_columns(marched, turning.problem)
+    turns = np.stack([columns[f"rate {axis} [rad/s]"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(turns, turning.rate, atol=1e-9)
+    quaternions = [values for name, values in columns.items() if name.startswith("attitude")]
+    np.testing.assert_allclose(np.transpose(quaternions)[-1], turning.attitude[-1], atol=1e-9)
+    write_marched(marched, turning.problem, tmp_path / "marched.csv")
+    with (tmp_path / "marched.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["rate z [rad/s]"]) for row in rows] == columns["rate z [rad/s]"].tolist()
+    assert set(rows[0]) == set(columns) and {"time [s]", "mass [kg]", "energy [J/kg]"} < set(columns)
 
 
 def test_json_is_the_same_table(mission, turning, tmp_path):

@@ -1,5 +1,7 @@
 """What a page shows of a flight, without a browser."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,8 +28,9 @@ def flat():
     return solve(problem, steps=20)
 
 
-def test_a_flat_flight_has_some_depth(flat):
-    shape = stage_of(flat)["shape"]
+def test_a_flat_flight_has_some_depth():
+    problem = TransferProblem(1.0, at(0, 0, 0), at(4, 1, 0), 4.0)
+    shape = stage_of(solve(problem, steps=10))["shape"]
     assert max(shape) == 1.0 and min(shape) >= 0.9 * THINNEST
 
 
@@ -85,6 +88,8 @@ def test_what_fails_is_said_to_fail(flat):
     assert verdict(flat, report)[0] and "What did not hold" not in [
         title for title, *_ in sections(flat, report)
     ]
+    broken = replace(flat, velocity=flat.velocity + 1.0)
+    assert not verdict(broken, verify(broken))[0]
     weak = TransferProblem(1.0, at(0, 0), at(4, 0), 1.0, actuator=BallForce(1.0))
     failed = solve(weak, steps=10)
     assert not verdict(failed, None)[0]
