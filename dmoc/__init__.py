@@ -78,7 +78,8 @@ if TYPE_CHECKING:
     from dmoc.flights.flown import fly as fly
     from dmoc.identification.estimate import Estimate as Estimate
     from dmoc.identification.identify import identify as identify
-    from dmoc.identification.identify import plan_for as plan_for
+    from dmoc.identification.plans import foresee as foresee
+    from dmoc.identification.plans import plan_for as plan_for
     from dmoc.legs.encounters import Bounce as Bounce
     from dmoc.legs.encounters import Flyby as Flyby
     from dmoc.legs.encounters import Frame as Frame
@@ -125,10 +126,11 @@ if TYPE_CHECKING:
     from dmoc.parts.forces import BoxForce as BoxForce
     from dmoc.parts.forces import FreeForce as FreeForce
     from dmoc.parts.forces import Unpowered as Unpowered
+    from dmoc.parts.largest import FinalHeight as FinalHeight
+    from dmoc.parts.largest import FinalRadius as FinalRadius
+    from dmoc.parts.largest import Information as Information
     from dmoc.parts.objectives import Effort as Effort
-    from dmoc.parts.objectives import FinalHeight as FinalHeight
     from dmoc.parts.objectives import FinalMass as FinalMass
-    from dmoc.parts.objectives import FinalRadius as FinalRadius
     from dmoc.parts.objectives import Fuel as Fuel
     from dmoc.parts.objectives import Objective as Objective
     from dmoc.parts.objectives import Time as Time
@@ -145,6 +147,7 @@ if TYPE_CHECKING:
     from dmoc.scene.team import Team as Team
     from dmoc.sensitivity.dispersion import Dispersion as Dispersion
     from dmoc.sensitivity.dispersion import disperse as disperse
+    from dmoc.sensitivity.feedback import feedback as feedback
     from dmoc.sensitivity.predict import predict as predict
     from dmoc.sensitivity.symmetries import Symmetry as Symmetry
     from dmoc.sensitivity.symmetries import symmetries as symmetries

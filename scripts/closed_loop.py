@@ -4,12 +4,17 @@ The solver is exported and built once; from then on CasADi alone is used. Every 
 is, has the time that is left, and is warm started from the plan before, moved on, multipliers included. The
 robot is heavier than the planner believes and is pushed about; it moves in steps of 20 ms.
 
+Then the same with longer times between plans, each with and without a feedback in between: the exported
+`predict` says how force and state of the first plan move with its start, and so what force answers a robot that
+is off the plan.
+
     ./scripts/run python scripts/closed_loop.py --plot closed_loop.png
 """
 
 import argparse
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -17,7 +22,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dmoc import export
+from dmoc import export, solve
 from dmoc.scene.problem_file import load_problem
 
 # A plan has this many steps.
@@ -32,6 +37,10 @@ LAST_PLAN = 2.0
 MASS_ERROR = 1.08
 # The planner takes obstacles to be larger by this [m], since a plan keeps clear of them at its nodes only.
 MARGIN = 0.05
+# Plans are made so seldom, too [s]; the longest leaves the first plan alone.
+PERIODS = (1.0, 2.0, 4.0, 8.0, 100.0)
+# From this part of the time on the gains of the feedback stay what they are [-].
+LAST_GAIN = 0.8
 # A plan is flown if its largest residual [N] and its violation of limits [-] are no larger than this.
 GOOD = {"largest_residual": 1e-6, "violation": 1e-6}
 
@@ -85,25 +94,59 @@ class Planner:
         return {name: x for name, x in plan.items() if f"guess_{name}" in self.inputs} if good else None
 
 
-def fly(planner: Planner, again: bool = True) -> tuple:
-    """Path [m] every tick, the last velocity [m/s], and the plans; with the first plan alone if not `again`."""
+def gains_of(folder: Path) -> np.ndarray:
+    """For each step of the plan the force [N] that answers a state off it, (steps, 3, 6), from `predict`."""
+    predict = ca.Function.load(f"{folder}/predict.casadi")
+    nominal = {name: ca.DM(value) for name, value in ca.Function.load(f"{folder}/nominal.casadi")().items()}
+    start = ca.MX.sym("start", 6)
+    known = {name: nominal[name] for name in predict.name_in() if name in nominal}
+    plan = predict(**{**known, "start_position": start[:3], "start_velocity": start[3:]})
+    states = ca.vertcat(plan["positions"], plan["velocities"])
+    slopes = ca.Function("slopes", [start], [ca.jacobian(states, start), ca.jacobian(plan["forces"], start)])
+    begin = ca.vertcat(nominal["start_position"], nominal["start_velocity"])
+    moved, pushed = (
+        np.array(part).reshape(-1, rows, 6) for part, rows in zip(slopes(begin), (6, 3), strict=True)
+    )
+    gains = np.array([push @ np.linalg.pinv(move) for push, move in zip(pushed, moved[:-1], strict=True)])
+    gains[int(LAST_GAIN * STEPS) :] = gains[int(LAST_GAIN * STEPS)]
+    return gains
+
+
+def fly(planner: Planner, period: float = PERIOD, gains: np.ndarray | None = None) -> tuple:
+    """Path [m] every tick, the last velocity [m/s], and the plans."""
     noise, duration, plan, since, plans = np.random.default_rng(1), planner.duration, None, 0.0, []
     q, v = (planner.inputs[f"start_{name}"].ravel() for name in ("position", "velocity"))
     path = [q]
     for tick in range(round(duration / TICK)):
         t = tick * TICK
-        if plan is None or (again and tick % round(PERIOD / TICK) == 0 and duration - t >= LAST_PLAN):
+        if plan is None or (tick % round(period / TICK) == 0 and duration - t >= LAST_PLAN):
             guess = moved_on(plan, duration - since, t - since) if plan else {}
             if found := planner.plan(q, v, duration - t, guess):
                 plan, since = found, t
                 plans.append(np.array(plan["positions"]))
+                states = CubicSpline(
+                    np.linspace(since, duration, STEPS + 1),
+                    np.vstack([np.array(plan[name]) for name in ("positions", "velocities")]).T,
+                )
             elif plan is None:
                 raise SystemExit("there is no first plan")
         now = int((t + 0.5 * TICK - since) / (duration - since) * STEPS)
         force = np.array(plan["forces"])[:, now] + push_at(t, noise)
+        if gains is not None:
+            force = force + gains[int((t + 0.5 * TICK) / duration * STEPS)] @ (np.append(q, v) - states(t))
         q, v = (np.array(x).ravel() for x in planner.step(q, v, planner.mass * MASS_ERROR, t, TICK, force))
         path.append(q)
     return np.array(path), v, plans
+
+
+def with_predict(folder: Path) -> np.ndarray:
+    """The gains around the first plan, whose zones are larger as the planner's are."""
+    problem = load_problem("free_flyer").make()
+    zones = [replace(zone, radius=zone.radius + MARGIN) for zone in problem.constraints]
+    problem = replace(problem, constraints=zones)
+    answer = solve(problem, steps=STEPS, hold=True)
+    export(problem, folder, steps=STEPS, hold=True, c=False, guess=answer)
+    return gains_of(folder)
 
 
 def draw(file: str, planner: Planner, path: np.ndarray, plans: list) -> None:
@@ -141,6 +184,7 @@ def main() -> None:
         begun, folder = time.perf_counter(), Path(work) / "free_flyer"
         export(load_problem("free_flyer").make(), folder, steps=STEPS, hold=True, c=False)
         planner, built = Planner(folder), time.perf_counter() - begun
+        gains = with_predict(Path(work) / "with_predict")
     path, v, plans = fly(planner)
     ms, count = 1e3 * np.array(planner.seconds), planner.iterations
     print(f"built once, in {built:.2f} s, for {len(ms)} plans, {planner.refused} of them refused")
@@ -150,7 +194,10 @@ def main() -> None:
     print("planning again:    ", report(planner, path, v))
     if file:
         draw(file, planner, path, plans)
-    print("the first plan only:", report(planner, *fly(planner, again=False)[:2]))
+    for period in PERIODS:
+        for name, gain in (("nothing", None), ("predict", gains)):
+            flown = report(planner, *fly(planner, period, gain)[:2])
+            print(f"a plan every {period:3.0f} s, {name} between them: {flown}")
     if clearance_of(planner, path).min() <= 0:
         raise SystemExit("the robot touched an obstacle")
 

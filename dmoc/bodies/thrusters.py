@@ -107,10 +107,10 @@ class Thrusters(OnBody, Burner):
         return tuple(f"thruster_{i + 1}" for i in range(len(self.directions)))
 
     def force(self, u: Any) -> Any:
-        return _columns(self.directions) @ u
+        return _ways(self.directions) @ u
 
     def wrench(self, rotation: Any, u: Any) -> tuple[Any, Any]:
-        places, ways = _columns(self.positions), _columns(self.directions)
+        places, ways = _columns(self.positions), _ways(self.directions)
         return rotation @ self.force(u), ca.cross(places, ways) @ u
 
     def throttle(self, u: Any) -> Any:
@@ -169,6 +169,12 @@ class Thrusters(OnBody, Burner):
 def _columns(rows: Any) -> Any:
     """Rows of three numbers as the columns of a matrix; of unknown ones the symbols, row after row."""
     return ca.reshape(rows, AXES, -1) if isinstance(rows, ca.SX) else ca.DM(np.array(rows).T)
+
+
+def _ways(rows: Any) -> Any:
+    """Directions as columns, unit vectors also where they are unknown."""
+    found = _columns(rows)
+    return found / ca.repmat(ca.sqrt(ca.sum1(found**2)), AXES, 1) if isinstance(rows, ca.SX) else found
 
 
 def _rows(name: str, value: Any, unit: str) -> tuple[tuple[float, ...], ...]:

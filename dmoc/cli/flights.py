@@ -18,6 +18,7 @@ from dmoc.cli.options import (
     attached,
     ends_at_once,
     problem_of,
+    switch,
     writable,
 )
 from dmoc.cli.pages import Dark
@@ -50,6 +51,12 @@ def disperse(
     force: Annotated[float, typer.Option(help="Standard deviation of the force: 0.01 is 1 %.")] = 0.0,
     pointing: Annotated[float, typer.Option(help="Standard deviation of its direction, in rad.")] = 0.0,
     mass: Annotated[float, typer.Option(help="Standard deviation of the mass: 0.01 is 1 %.")] = 0.0,
+    force_noise: Annotated[
+        float, typer.Option(help="Standard deviation of a force in N, another one in each step.")
+    ] = 0.0,
+    feedback: Annotated[
+        bool, switch("--feedback", help="Let the force answer how far a flight is off the plan.")
+    ] = False,
     samples: Annotated[int, typer.Option(help="Number of flights, at least 2.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same flights.")] = 0,
     plot: Annotated[Path | None, typer.Option(help="Draw the flights here (png, pdf or svg).")] = None,
@@ -63,7 +70,9 @@ def disperse(
     writable(plot, drawn=True)
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once():
         solution = attached(file, source)
-        found = dmoc.disperse(solution, _pair(start), force, pointing, mass, samples, seed)
+        found = dmoc.disperse(
+            solution, _pair(start), force, pointing, mass, samples, seed, force_noise, feedback
+        )
     if plot is not None:
         from dmoc.charts.dispersion import dispersion_figure
         from dmoc.charts.study import save_page
@@ -104,8 +113,9 @@ def identify(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE,SIGMA",
-            help="A number to find: mass, drag, offset, strength, turn, delay, inertia, or one of an effect of "
-            "--scene. What it is thought to be, and how surely, may be left out; repeat for more.",
+            help="A number to find: mass, drag, offset, strength, turn, delay, inertia, with --scene tilt and "
+            "exhaust_velocity, or one of an effect. What it is thought to be, and how surely, may be left out; "
+            "repeat for more.",
         ),
     ] = None,
     scene: Annotated[
@@ -198,7 +208,9 @@ def _given(seen: Any, asked: list[str], mass: float | None, scene: Any) -> dict[
     effects = list(found.get("effects", ()))
     for text in asked:
         name, value, sigma = _parsed(text)
-        if name in ALWAYS and not (name == "drag" and effects):
+        if name in ("tilt", "exhaust_velocity"):
+            found |= _of_actuator(name, value, sigma, found)
+        elif name in ALWAYS and not (name == "drag" and effects):
             begin, several = ALWAYS[name]
             begin = found[name] if name == "mass" and isinstance(found.get(name), float) else begin
             size = {"offset": seen.axes, "inertia": 3}.get(name, 1)
@@ -215,6 +227,19 @@ def _given(seen: Any, asked: list[str], mass: float | None, scene: Any) -> dict[
     return found | {"effects": effects}
 
 
+def _of_actuator(name: str, value: float | None, sigma: float | None, found: dict[str, Any]) -> dict[str, Any]:
+    """An unknown number of the actuator of a scene."""
+    from dmoc.basics.unknown import Unknown, with_field
+
+    actuator = found.get("actuator")
+    if name == "tilt":
+        return {"tilt": Unknown((value or 0.0,) * 2, sigma)}
+    if actuator is None or not actuator.burns:
+        raise ValueError("exhaust_velocity needs a --scene whose actuator burns propellant")
+    begin = actuator.exhaust_velocity if value is None else value
+    return {"actuator": with_field(actuator, name, Unknown(begin, sigma))}
+
+
 def _of_scene(problem: Any) -> dict[str, Any]:
     """What a problem says of its body."""
     if hasattr(problem, "plan") or hasattr(problem, "members"):
@@ -222,6 +247,8 @@ def _of_scene(problem: Any) -> dict[str, Any]:
     if problem.system is not None:
         raise ValueError("--scene takes a transfer of one body; this problem has several")
     known = {"mass": problem.mass, "effects": problem.effects}
+    if problem.actuator.burns:
+        known["actuator"] = problem.actuator
     if problem.inertia is not None:
         known |= {"inertia": problem.inertia, "actuator": problem.actuator}
     return known

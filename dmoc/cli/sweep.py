@@ -40,6 +40,19 @@ Keep = Annotated[
     typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
 ]
 
+Errors = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Also fly every answer with errors, as dmoc disperse does: start=0.01,0.001, force=0.01, "
+        "samples=200 and so on; repeat for more.",
+    ),
+]
+
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
+]
+
 Workers = Annotated[int | None, typer.Option(help="Worker processes; as many as there are cores if not given.")]
 
 
@@ -70,10 +83,9 @@ def sweep(
         switch("--follow", help="Start points from their neighbours' answers: faster, on one branch."),
     ] = False,
     keep: Keep = None,
+    error: Errors = None,
     workers: Workers = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler to solve on instead.")
-    ] = None,
+    scheduler: Scheduler = None,
     restart: Annotated[bool, switch("--restart", help="Begin anew instead of going on.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -100,6 +112,7 @@ def sweep(
             settings=parse_settings(settings or ()),
             follow=follow,
             keep=keep,
+            errors=parse_settings(error, "--error") if error else None,
             workers=workers,
             scheduler=scheduler,
             restart=restart,

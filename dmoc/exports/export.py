@@ -123,6 +123,8 @@ def export(
         raise ValueError("a team of bodies is not exported; export the body that you mean, a TransferProblem")
     mission = hasattr(problem, "joints")
     of_kind("problem", problem, Mission if mission else TransferProblem)
+    if problem.objective.learns:
+        raise ValueError("a plan with Information has no exported functions; export it with another objective")
     hold, c = flag("hold", hold), flag("c", c)
     target = _checked_folder(as_path(folder))
     made = _of_mission if mission else _of_transfer

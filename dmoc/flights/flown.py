@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -17,7 +18,7 @@ from dmoc.ends.base import Boundary
 from dmoc.flights.flight import Flight
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.march import rollout
+from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.actuator import Actuator
@@ -85,17 +86,11 @@ def fly(
     if (lost := number("dropped", dropped, "-", nonnegative=True)) >= 1:
         raise ValueError(f"dropped must be less than 1 [-]; got {lost:g}")
     whole("seed", seed, least=0)
-    problem = TransferProblem(
-        mass,
-        start,
-        start,
-        float(clock[-1] - clock[0]),
-        effects=effects,
-        actuator=FreeForce() if actuator is None else actuator,
-        start_time=float(clock[0]),
-        inertia=inertia,
-    )
-    commands = _at_times("forces", forces, clock, problem.controls)
+    lasts, begins = float(clock[-1] - clock[0]), float(clock[0])
+    actuator = FreeForce() if actuator is None else actuator
+    problem = TransferProblem(mass, start, start, lasts, effects, actuator, start_time=begins, inertia=inertia)
+    given = _at_times("forces", forces, clock, len(force_labels(problem)))
+    commands = with_throttle(given, problem)
     kinds = ("positions", "force", "velocities", "attitudes", "rates", "lost")
     random = {kind: np.random.default_rng([seed, i]) for i, kind in enumerate(kinds)}
     force = _turned(problem, number("strength", strength, "-") * commands, turn)
@@ -118,7 +113,20 @@ def fly(
     gone = (random["lost"].random(len(clock)) < lost) | (clock < clock[0] + late)
     for kind in found.keys() - {"attitudes"}:
         found[kind][gone] = np.nan
-    return Flight(clock, forces=commands, name=name, **found)
+    return Flight(clock, forces=given, name=name, **found)
+
+
+def force_labels(problem: TransferProblem) -> tuple[str, ...]:
+    """The controls that a flight has: all of the actuator but a throttle, which is the size of the force."""
+    labels = tuple(problem.actuator.labels(problem.dimension))
+    return labels[:-1] if labels and labels[-1] == "throttle" else labels
+
+
+def with_throttle(forces: np.ndarray, problem: TransferProblem) -> np.ndarray:
+    """Commands with the throttle that goes with each force, where the actuator has one and they have not."""
+    if forces.shape[1] == problem.controls:
+        return forces
+    return np.hstack([forces, np.linalg.norm(forces, axis=1)[:, None]])
 
 
 def _clock(times: Any) -> np.ndarray:
@@ -184,9 +192,12 @@ def _flown(problem: TransferProblem, times: np.ndarray, force: np.ndarray, delay
     path = DiscretePath(
         mesh, ORDER, True, span, np.tile(position, (nodes, 1)), held, mass, speed, speed, made_of=several
     )
+    path = replace(path, mass=node_masses(dynamics, path, problem.mass))
+    if path.mass.min() <= problem.actuator.dry_mass:
+        raise ValueError(f"all propellant burns before the end: the mass falls to {path.mass.min():.3g} kg")
     momentum = dynamics.momentum(times[0], position, speed, problem.mass).full().ravel()
     q, p = rollout(dynamics, path, problem.start_time, position, momentum)
-    v = dynamics.velocity(ends[None], q.T, p.T, np.full((1, len(ends)), problem.mass)).full().T
+    v = dynamics.velocity(ends[None], q.T, p.T, path.mass[None, :: scheme(ORDER).degree]).full().T
     at = np.argmin(np.abs(ends[:, None] - seen), axis=0)
     made = configuration.coordinates
     q, v = q[at], v[at]
@@ -239,8 +250,8 @@ def turned(angles: Sequence[Any], force: Any, axes: int) -> Any:
         return force
     if axes == 2:
         cos, sin = ca.cos(angles[0]), ca.sin(angles[0])
-        return ca.vertcat(cos * force[0] - sin * force[1], sin * force[0] + cos * force[1])
+        return ca.vertcat(cos * force[0] - sin * force[1], sin * force[0] + cos * force[1], force[2:])
     vector = ca.vertcat(*angles)
     cross = ca.skew(ca.SX(vector))
     rotation = ca.SX.eye(3) + (cross + cross @ cross / 2) / (1 + ca.dot(vector, vector) / 4)
-    return ca.vertcat(rotation @ force[:3], *([rotation @ force[3:]] if force.numel() == 6 else []))
+    return ca.vertcat(rotation @ force[:3], rotation @ force[3:] if force.numel() == 6 else force[3:])

@@ -96,7 +96,14 @@ def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) 
     """The chart around a guess; None where such unknowns do not suit the problem."""
     lone, n = problem.attraction.lone, problem.dimension
     turns = problem.turns or bool(problem.links)
-    if lone is None or turns or guess.hold or problem.constraints or not _turns_with_it(problem):
+    if (
+        lone is None
+        or turns
+        or guess.hold
+        or problem.constraints
+        or problem.objective.learns
+        or not _turns_with_it(problem)
+    ):
         return None
     if angle_around(problem, guess) < 2 * np.pi * VERY_MANY_TURNS:
         return None

@@ -16,6 +16,8 @@ from dmoc.basics.memory import Shelf
 from dmoc.basics.numerics import nonzeros_of
 from dmoc.identification.setting import Setting
 
+# Groups of these kinds count steps, others nodes.
+OF_STEPS = ("control", "step", "between")
 # So many functions are held in this process: flights of one kind share them.
 _FUNCTIONS = Shelf(60)
 
@@ -143,8 +145,7 @@ class Equations:
 def add_motion(equations: Equations) -> None:
     """The discrete Euler-Lagrange equations, whose parameters are the numbers of the scene."""
     setting = equations.setting
-    low, high = setting.row_bounds
-    held = low == high
+    held = setting.held
     place = np.cumsum(held) - 1
     for block in setting.blocks:
         known, used = block.kernel.used
@@ -197,7 +198,7 @@ def layout_nodes(setting: Setting, layout: Any) -> np.ndarray:
     last = setting.steps * setting.degree
     found = np.zeros(layout.size)
     for group in layout.groups:
-        many = np.arange(group.count) * (setting.degree if group.kind in ("control", "step") else 1.0)
+        many = np.arange(group.count) * (setting.degree if group.kind in OF_STEPS else 1.0)
         ends = last if group.name.startswith("goal") else 0.0
         found[group.indices] = ends if group.kind == "end" else many
     return found

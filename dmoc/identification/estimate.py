@@ -48,6 +48,8 @@ class Estimate:
         Of the centre of mass along the estimated path [m], [m/s].
     force : array, shape (samples-1, controls)
         The forces that flew, as far as they can be told [N].
+    mass : array, shape (samples,)
+        Of the body; it falls where propellant burns [kg].
     success : bool
     message : str
         What went wrong, and what to try.
@@ -64,6 +66,7 @@ class Estimate:
     position: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
+    mass: np.ndarray
     sigmas_given: dict[str, float]
     success: bool
     message: str

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.effects.base import Effect
-from dmoc.ends.base import State
 from dmoc.flights.flight import Flight
 from dmoc.identification.equations import Equations, add_motion
 from dmoc.identification.estimate import Estimate
@@ -20,6 +18,7 @@ from dmoc.identification.measured import (
     add_attitudes,
     add_beliefs,
     add_forces,
+    add_mass,
     add_positions,
     add_speeds,
     delayed,
@@ -30,7 +29,6 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.actuator import Actuator
-from dmoc.scene.problem import TransferProblem
 
 # Where noise is to be found from the flight, it is first taken to be this part of the extent of the path [-].
 FIRST_NOISE = 1e-3
@@ -51,6 +49,7 @@ def identify(
     strength: Any = 1.0,
     turn: Any = None,
     delay: Any = 0.0,
+    tilt: Any = None,
     noise: float | None = None,
     force_noise: Any = 0.0,
     velocity_noise: float | None = None,
@@ -71,7 +70,9 @@ def identify(
     flight : Flight or path
         A flight, or its CSV table.
     mass : float or Unknown
-        [kg]. Without a known force it cannot be told.
+        At the start of the flight [kg]. Without a known force it cannot be told. While an `Engine` or another
+        actuator with an exhaust velocity burns, the mass falls with the commanded thrust; the exhaust velocity
+        of the actuator may be `Unknown`, too.
     effects : sequence of Effect
         Any number in them may be `Unknown`, such as `LinearDrag(Unknown(1.0))`.
     actuator : Actuator, optional
@@ -91,6 +92,9 @@ def identify(
         the force and the torque of a `Wrench`.
     delay : float or Unknown
         How much older measurements are than their times say [s]; that is less than the time between samples.
+    tilt : 2 floats or Unknown, or a pair for each thruster, optional
+        What is added to the direction of each of the `Thrusters` along the two body axes that it points along
+        least [-], the tangents of small angles; directions stay unit vectors.
     noise : float, optional
         Standard deviation of each axis of positions [m]; found from the flight if not given.
     force_noise : float or sequence of float
@@ -120,7 +124,7 @@ def identify(
     flight = flight if isinstance(flight, Flight) else Flight.read(flight)
     sigmas = sigmas_of(flight, noise, velocity_noise, attitude_noise, rate_noise)
     problem = scene_of(flight, mass, effects, actuator, inertia)
-    ties = ties_of(flight, problem, offset, center, strength, turn, delay)
+    ties = ties_of(flight, problem, offset, center, strength, turn, delay, tilt)
     spread = force_noise_of(force_noise, problem.controls)
     problem, wanted = wanted_of(problem, mass, inertia, ties)
     if not wanted:
@@ -184,6 +188,7 @@ def _fit_at(setting: Setting, sigmas: dict[str, float], spread: np.ndarray, ties
         if len(ties.strength) == setting.problem.controls
         else ties.strength * setting.problem.controls
     )
+    add_mass(equations, fixed)
     if not add_forces(equations, spread, strength, ties.turn):
         fixed[setting.columns["force"].indices] = True
     add_beliefs(equations)
@@ -207,7 +212,7 @@ def _answer(
         setting.path.duration,
         get["position"] + setting.units.origin,
         get["force"],
-        np.full(len(get["position"]), problem.mass),
+        get["mass"][:, 0] if "mass" in get else np.full(len(get["position"]), problem.mass),
         get["start.velocity"][0],
         get["goal.velocity"][0],
         made_of=setting.path.made_of,
@@ -232,6 +237,7 @@ def _answer(
         path.position[ends],
         velocity,
         get["force"],
+        path.mass[ends],
         sigmas,
         success,
         message,
@@ -245,43 +251,3 @@ def _why(fit: Fit, left: float) -> str:
         f"equations off by {left:.1e}): begin with values nearer to the truth, "
         "ask for fewer numbers, or state a sigma for each"
     )
-
-
-def plan_for(estimate: Estimate, problem: TransferProblem | None = None, **changes: Any) -> TransferProblem:
-    """A problem with the estimated numbers in it: mass, inertia, effects, and thrusters where it has some.
-
-    Parameters
-    ----------
-    estimate : Estimate
-    problem : TransferProblem, optional
-        The plan whose numbers are to be replaced: its mass and inertia where the estimate has them, and its
-        effects by those of the estimate. Without it a plan from where the flight ends, at rest or not.
-    changes
-        Further arguments of `TransferProblem`: without a problem at least goal and duration.
-
-    Raises
-    ------
-    ValueError
-        If the identification failed, or a number of it is not observable.
-    """
-    if not estimate.success:
-        raise ValueError(f"the identification failed: {estimate.message}")
-    if blind := [name for name, sigma in estimate.sigma.items() if not np.isfinite(sigma)]:
-        raise ValueError(f"{blind[0]} is not observable in this flight: nothing can be planned with it")
-    known = estimate.problem
-    found: dict[str, Any] = {"mass": known.mass, "effects": known.effects}
-    if known.inertia is not None:
-        found["inertia"] = known.inertia
-    if hasattr(known.actuator, "positions"):
-        found["actuator"] = known.actuator
-    if problem is not None:
-        if problem.system is not None:
-            raise ValueError("plan_for takes the plan of one body; this problem is one of several")
-        return replace(problem, **found | changes)
-    if missing := [name for name in ("goal", "duration") if name not in changes]:
-        raise ValueError(f"give a problem, or a {missing[0]} of the plan")
-    if "start" not in changes:
-        if known.inertia is not None:
-            raise ValueError("give the start of the plan: that of a body that turns is a Pose")
-        found["start"] = State(tuple(estimate.position[-1]), tuple(estimate.velocity[-1]))
-    return TransferProblem(**found | {"start_time": float(estimate.flight.times[-1])} | changes)

@@ -159,20 +159,23 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
             ca.SX.sym("w", len(sigma)),
         )
         t, h = writer.start_time + begin * writer.duration, length * writer.duration
-        masses = ca.repmat(writer.mass, degree + 1)
+        burns = setting.problem.actuator.burns
+        masses = ca.SX.sym("m", degree + 1) if burns else ca.repmat(writer.mass, degree + 1)
         momenta = legendre_function(dynamics, setting.order, True)(nodes, masses, u, t, h, writer.origin)
         place = nodes[:n] + writer.origin
         leaving = -dynamics.configuration.along(place, momenta[0])
-        speed = dynamics.velocity(t, place, leaving, writer.mass)[which.tolist()]
+        speed = dynamics.velocity(t, place, leaving, masses[0])[which.tolist()]
         base = ca.SX.sym("p", p.numel())
         numbers = scene_numbers(setting, base, [setting.mass_at], setting.slopes, theta)
         result = ca.substitute(weight * (speed - y), p, numbers)
-        return [nodes, u, theta], [begin, length, y, weight, base], result
+        return [nodes, u, *([masses] if burns else []), theta], [begin, length, y, weight, base], result
 
     key = "speeds", setting.writer, tuple(which), degree
     base = setting.parameters - setting.slopes @ [one.begin for one in setting.wanted]
     place, force, mesh = columns["position"].indices, columns["force"].indices, setting.path.mesh
-    at = [place[:, there * degree + j] for j in range(degree + 1)]
+    every = [there * degree + j for j in range(degree + 1)]
+    at = [place[:, nodes] for nodes in every]
+    burning = [columns["mass"].indices[:, nodes] for nodes in every] if "mass" in columns else []
     weights = np.isfinite(measured) / sigma
     numbers = np.vstack(
         [
@@ -186,7 +189,7 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
     equations.add_residuals(
         "speed",
         made(key, len(there), write),
-        equations.with_numbers(np.vstack([*at, force[:, there]])),
+        equations.with_numbers(np.vstack([*at, force[:, there], *burning])),
         numbers,
     )
 
@@ -221,6 +224,26 @@ def add_forces(equations: Equations, sigma: np.ndarray, strength: Sequence[Any],
         nodes = setting.degree * np.arange(setting.steps)
         equations.add_rows(made(key, columns.shape[1], write), columns, numbers, nodes, 1 / setting.units.force)
     return True
+
+
+def add_mass(equations: Equations, fixed: np.ndarray) -> None:
+    """The mass at the start, where propellant burns: known, or the number that is asked for."""
+    setting = equations.setting
+    if "mass" not in setting.columns:
+        return
+    first = setting.columns["mass"].indices[:, :1]
+    asked = [j for j, one in enumerate(setting.wanted) if one.inverse]
+    if not asked:
+        fixed[first.ravel()] = True
+        return
+
+    def write() -> tuple:
+        m, x = ca.SX.sym("m"), ca.SX.sym("x")
+        return [m, x], [], m - 1 / x
+
+    columns = np.vstack([first, setting.numbers[asked][:, None]])
+    part = made(("mass",), 1, write)
+    equations.add_rows(part, columns, np.empty((0, 1)), np.zeros(1), 1 / setting.units.mass)
 
 
 def add_beliefs(equations: Equations) -> None:

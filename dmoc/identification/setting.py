@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,8 +13,11 @@ from dmoc.basics.quaternions import normalised, times
 from dmoc.configurations.coordinates import ATTITUDE, PLACE
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.flights.flight import Flight
+from dmoc.flights.flown import with_throttle
 from dmoc.identification.wanted import Wanted
+from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
+from dmoc.motion.march import node_masses
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Block
@@ -23,6 +26,9 @@ from dmoc.nlp.stencils import Writer
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
+
+# The path to begin with has at least this part of the mass at its start [-].
+LEFT = 0.1
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,16 @@ class Setting:
     def row_scales(self) -> np.ndarray:
         return self.rows.scales()
 
+    @cached_property
+    def held(self) -> np.ndarray:
+        """The rows that are equations of motion; those of an actuator hold of commands by themselves."""
+        low, high = self.row_bounds
+        found = low == high
+        for group in self.rows.groups:
+            if group.owner is not None and group.owner.field == "actuator":
+                found[group.start : group.stop] = False
+        return found
+
     @property
     def numbers(self) -> np.ndarray:
         """Where the numbers stand among the unknowns."""
@@ -112,6 +128,7 @@ class Setting:
         values = {
             "position": path.position - self.units.origin,
             "force": path.control,
+            "mass": path.mass,
             "start.velocity": path.start_velocity,
             "goal.velocity": path.goal_velocity,
         }
@@ -140,11 +157,15 @@ def first_path(flight: Flight, problem: TransferProblem, order: int) -> Discrete
     place, ends = np.hstack(position), np.hstack(speeds)
     count = problem.controls
     forces = np.zeros((len(mesh) - 1, count)) if flight.forces is None else flight.forces[:-1]
+    forces = with_throttle(forces, problem)
     mass = np.full(len(place), float(problem.mass))
     several = made if len(made.blocks) > 1 or configuration.surplus else None
-    return DiscretePath(
+    path = DiscretePath(
         mesh, order, True, flight.duration, place, forces, mass, ends[0], ends[1], made_of=several
     )
+    masses = node_masses(Dynamics.of(problem), path, float(problem.mass))
+    # A mass that is thought to be too small would be burnt away.
+    return replace(path, mass=np.maximum(masses, LEFT * float(problem.mass)))
 
 
 def _smooth(times: np.ndarray, given: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

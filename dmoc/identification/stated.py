@@ -16,7 +16,17 @@ from dmoc.configurations.rigid import checked_inertia
 from dmoc.ends.base import State
 from dmoc.ends.poses import Attitude, Pose
 from dmoc.flights.flight import Flight
-from dmoc.identification.wanted import AXES, Wanted, center_changed, of_effects, of_inertia, of_vector
+from dmoc.flights.flown import force_labels
+from dmoc.identification.wanted import (
+    AXES,
+    Wanted,
+    center_changed,
+    exhaust_changed,
+    of_effects,
+    of_inertia,
+    of_tilt,
+    of_vector,
+)
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.rows import title
 from dmoc.scene.problem import TransferProblem
@@ -31,6 +41,7 @@ class Ties:
     strength: tuple
     turn: tuple
     delay: Any
+    tilt: tuple
 
 
 def sigmas_of(flight: Flight, noise: Any, velocity: Any, attitude: Any, rate: Any) -> dict[str, float]:
@@ -77,10 +88,10 @@ def scene_of(flight: Flight, mass: Any, effects: Any, actuator: Any, inertia: An
         start_time=float(flight.times[0]),
         inertia=None if inertia is None else _moments(inertia),
     )
-    if problem.actuator.burns:
-        raise ValueError("identify takes flights of constant mass; this actuator burns propellant")
+    if is_unknown(mass) and problem.actuator.burns and problem.turns:
+        raise ValueError("of a body that turns while propellant burns, the mass at the start must be known")
     count = 0 if flight.forces is None else flight.forces.shape[1]
-    if count not in (0, problem.controls):
+    if count not in (0, problem.controls, len(force_labels(problem))):
         kind = type(problem.actuator).__name__
         raise ValueError(f"the flight has {count} controls but {kind} takes {problem.controls}")
     return problem
@@ -96,7 +107,14 @@ def _moments(inertia: Any) -> Any:
 
 
 def ties_of(
-    flight: Flight, problem: TransferProblem, offset: Any, center: Any, strength: Any, turn: Any, delay: Any
+    flight: Flight,
+    problem: TransferProblem,
+    offset: Any,
+    center: Any,
+    strength: Any,
+    turn: Any,
+    delay: Any,
+    tilt: Any = None,
 ) -> Ties:
     axes, count = flight.axes, problem.controls
     offset = _vector("offset", offset, "m", axes)
@@ -108,8 +126,8 @@ def ties_of(
         raise ValueError(
             "center needs Thrusters as the actuator: it says where the centre of mass is against them"
         )
-    if axes and not hasattr(problem.actuator, "positions") and not hasattr(problem.actuator, "frame"):
-        angles = {1: 0, 2: 1, 3: 3}[axes]
+    if tuple(problem.actuator.labels(axes))[:axes] == AXES[:axes] and not hasattr(problem.actuator, "frame"):
+        angles = {0: 0, 1: 0, 2: 1, 3: 3}[axes]
     else:
         angles = 3 if hasattr(problem.actuator, "frame") else 0
     if turn is not None and not angles:
@@ -129,7 +147,21 @@ def ties_of(
         (number("strength", strength, "-"),) if one else _vector("strength", strength, "-", count),
         _vector("turn", turn, "rad", angles),
         delay,
+        _tilts(tilt, problem),
     )
+
+
+def _tilts(given: Any, problem: TransferProblem) -> tuple:
+    """Two numbers a thruster, one thruster after the other."""
+    if given is None:
+        return ()
+    if not hasattr(problem.actuator, "positions"):
+        raise ValueError("tilt needs Thrusters as the actuator: it says how each is turned from its direction")
+    rows = entries(given) or ()
+    rows = rows if rows and entries(rows[0]) is not None else (given,) * problem.controls
+    if len(rows) != problem.controls:
+        raise ValueError(f"tilt must be two numbers, or two for each of {problem.controls} thrusters")
+    return tuple(one for i, row in enumerate(rows) for one in _vector(f"tilt[{i}]", row, "-", 2))
 
 
 def _vector(name: str, value: Any, unit: str, size: int) -> tuple:
@@ -175,6 +207,12 @@ def wanted_of(
             replace(one, changed=_moved(one)) for one in of_vector("center", ties.center, "m", AXES, SPACE)
         ]
     labels = tuple(problem.actuator.labels(problem.dimension))
+    problem, tilts = of_tilt(problem, ties.tilt, labels)
+    found += tilts
+    speed: Any = getattr(problem.actuator, "exhaust_velocity", None)
+    if is_unknown(speed):
+        name = "exhaust_velocity"
+        found.append(Wanted(name, "m/s", float(speed), speed.sigma, "scene", 0, exhaust_changed))
     found += of_vector(
         "strength",
         ties.strength if len(ties.strength) > 1 else ties.strength[0],
@@ -204,8 +242,13 @@ def settled(problem: TransferProblem, wanted: Sequence[Wanted], values: Sequence
     effects = tuple(_plain(effect) for effect in problem.effects)
     found = with_field(with_field(problem, "effects", effects), "inertia", _floats(problem.inertia))
     if hasattr(found.actuator, "positions"):
-        places = with_field(found.actuator, "positions", _floats(found.actuator.positions))
-        found = with_field(found, "actuator", places)
+        made = with_field(found.actuator, "positions", _floats(found.actuator.positions))
+        ways = np.array(found.actuator.directions, float)
+        ways = ways / np.linalg.norm(ways, axis=1)[:, None]
+        found = with_field(found, "actuator", with_field(made, "directions", tuple(map(tuple, ways.tolist()))))
+    speed: Any = getattr(found.actuator, "exhaust_velocity", None)
+    if is_unknown(speed):
+        found = with_field(found, "actuator", with_field(found.actuator, "exhaust_velocity", float(speed)))
     return found
 
 

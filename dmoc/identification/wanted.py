@@ -31,7 +31,7 @@ class Wanted:
         Standard deviation of that belief; None if nothing is known.
     kind : str
         "mass"; "scene" for other numbers of the equations of motion; or of what ties them to the flight:
-        "offset", "strength", "turn", "delay"; "center" is both.
+        "offset", "strength", "turn", "delay"; "center" is both, and "tilt" is of the scene.
     index : int
         Which axis, control or turn it is.
     changed : callable or None
@@ -113,6 +113,43 @@ def _inertia_changed(i: int, problem: Any, value: float) -> Any:
     rows = [list(row) for row in problem.inertia]
     rows[i][i] = Unknown(value)
     return with_field(problem, "inertia", tuple(map(tuple, rows)))
+
+
+def exhaust_changed(problem: Any, value: float) -> Any:
+    """The scene whose propellant leaves at another speed."""
+    return with_field(problem, "actuator", with_field(problem.actuator, "exhaust_velocity", Unknown(value)))
+
+
+def tilt_axes(direction: Any) -> tuple[int, int]:
+    """The two body axes that a direction points along least."""
+    first, second = sorted(np.argsort(np.abs(direction), kind="stable")[:2].tolist())
+    return first, second
+
+
+def tilted(row: int, axis: int, problem: Any, value: float) -> Any:
+    """The scene in which so much is added to the direction of a thruster along a body axis."""
+    ways = [list(way) for way in problem.actuator.directions]
+    ways[row][axis] = float(ways[row][axis]) + value
+    opened = tuple(tuple(Unknown(x) for x in way) for way in ways)
+    return with_field(problem, "actuator", with_field(problem.actuator, "directions", opened))
+
+
+def of_tilt(problem: Any, tilt: tuple, labels: tuple[str, ...]) -> tuple[Any, list[Wanted]]:
+    """The scene with thrusters turned as they are thought to be, and what of it is unknown."""
+    if not (any(tilt) or any(map(is_unknown, tilt))):
+        return problem, []
+    found, stated = [], problem.actuator.directions
+    for k, one in enumerate(tilt):
+        row, axis = k // 2, tilt_axes(stated[k // 2])[k % 2]
+        problem = tilted(row, axis, problem, float(one))
+        if is_unknown(one):
+            name, changed = f"tilt.{labels[row]}.{AXES[axis]}", partial(_retilted, row, axis, float(one))
+            found.append(Wanted(name, "-", float(one), one.sigma, "tilt", k, changed))
+    return problem, found
+
+
+def _retilted(row: int, axis: int, before: float, problem: Any, value: float) -> Any:
+    return tilted(row, axis, problem, value - before)
 
 
 def center_changed(i: int, problem: Any, value: float) -> Any:

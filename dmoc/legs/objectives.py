@@ -29,6 +29,10 @@ class Share(Objective):
 
     whole: Objective
 
+    def __post_init__(self) -> None:
+        if self.whole.learns:
+            raise ValueError("Information is an objective of one transfer, not of a mission or of a team")
+
     @property
     def sense(self) -> int:  # type: ignore[override]
         return self.whole.sense

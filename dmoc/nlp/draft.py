@@ -80,7 +80,7 @@ class Draft:
 
     def duration(self) -> ca.SX:
         """The duration: an unknown if it is free, a parameter if not."""
-        return self.take("duration", 1) if self.writer.problem.free_duration else self.writer.duration
+        return self._once("duration") if self.writer.problem.free_duration else self.writer.duration
 
     def between(self, known: list) -> list:
         """Symbols that stand for some columns in the rows: see `kernel`."""
@@ -101,7 +101,21 @@ class Draft:
             self._limits.append(Limit(name, kind, bare, owner))
             self.add(name, ca.vertcat(*[row.expression for row in rows]))
 
+    def unknowns(self, group: str) -> list[tuple[ca.SX, slice]]:
+        """The symbols of a group so far, and which of its entries they are."""
+        return [
+            (symbol, at)
+            for symbol, (name, at) in zip(self._symbols, self._unknowns, strict=True)
+            if name == group
+        ]
+
+    def rows_of(self, group: str) -> list[tuple[ca.SX, slice]]:
+        """What has been added to the rows of a group, and to which of them."""
+        return [(rows, at) for rows, (name, at) in zip(self._rows, self._targets, strict=True) if name == group]
+
     def stencil(self, every: str) -> Stencil:
+        if self.writer.lesson is not None:
+            self.writer.lesson.extend(self, every)
         given = ca.vertcat(*self._symbols), ca.vertcat(*self._data), self.writer.parameters
         made = kernel(every, *given, ca.vertcat(*self._rows), ca.SX(self.cost), self._between)
         places = tuple(self._unknowns), tuple(self._numbers), tuple(self._targets)

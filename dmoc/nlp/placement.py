@@ -13,9 +13,25 @@ from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
 from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout, Limit, Stencil, Stencils
+from dmoc.nlp.lesson import (
+    SENSITIVITY,
+    SHARE,
+    SPREAD,
+    at_start,
+    limits,
+    pairs,
+    ways_of,
+    with_columns,
+)
+from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.problem import TransferProblem
+
+# A path along which a number moves nothing is taken to begin with as if it moved it by this part of the extent
+# [-]: the logarithm of no information has no value.
+LEAST = 1e-6
+BEGIN = 1e-2
 
 
 class Placement:
@@ -48,6 +64,8 @@ class Placement:
         impulse = (problem.mass / (unit * units.time))[None]
         axes = tuple(Row(name, 0, 0.0, 0.0) for name in self.dynamics.configuration.names)
         self._add_rows(Limit("dynamics", "smooth", axes, None), self.counts["node"], impulse)
+        if problem.objective.learns:
+            self._add_lesson(impulse)
         numbers = {
             "fraction": node_fractions(mesh, rule),
             "weight": node_weights(mesh, rule),
@@ -87,7 +105,18 @@ class Placement:
             columns = columns.add(LEG_START, "end", ("",), 1, units.time)
         columns = columns.add("start.velocity", "end", body.velocity_names, 1, speeds)
         columns = columns.add("goal.velocity", "end", body.velocity_names, 1, speeds)
-        return columns.add("duration", "end", ("",), 1, units.time) if problem.free_duration else columns
+        if problem.free_duration:
+            columns = columns.add("duration", "end", ("",), 1, units.time)
+        return with_columns(columns, problem, nodes, units.length) if problem.objective.learns else columns
+
+    def _add_lesson(self, impulse: np.ndarray) -> None:
+        """The rows of sensitivities, of which those of the goal are free, and of their regression."""
+        (motion, scale), *others = limits(self.problem, self.units.length, impulse)
+        self._add_rows(motion, self.counts["node"], scale)
+        free = slice(-len(motion.rows), None)
+        self._lower[-1][free], self._upper[-1][free] = -np.inf, np.inf
+        for limit, size in others:
+            self._add_rows(limit, 1, size)
 
     def _add_rows(self, limit: Limit, count: int, scale: Any) -> None:
         labels, units = [row.name for row in limit.rows], [row.unit for row in limit.rows]
@@ -113,3 +142,68 @@ class Placement:
             stacked(self.rows, stencil.targets),
             np.vstack(values) if values else np.empty((0, count)),
         )
+
+
+def sensitivities(program: Any, values: dict[str, Any], p: np.ndarray) -> dict[str, np.ndarray]:
+    """Sensitivities at all nodes, shape (nodes, ways x axes), shares and spreads, of a path by its unknowns.
+
+    The rows are linear in the sensitivities and as banded as those of motion: one factorisation has them.
+    """
+    # A scene without `Information` does without SciPy.
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
+    problem, columns, rows = program.problem, program.columns, program.rows
+    stencils = stencils_of(problem, program.scheme.order, program.hold)
+    placed = Placement(problem, stencils, program.scheme, program.hold, program.mesh, program.units)
+    group, targets = columns[SENSITIVITY], rows[SENSITIVITY]
+    s = np.zeros((group.count, len(group.labels)))
+    s[0] = at_start(problem)
+    whole = dict(values) | {SENSITIVITY: s}
+    whole |= {name: np.zeros(len(columns[name].labels)) for name in (SHARE, SPREAD)}
+    x = np.concatenate([np.ravel(whole[one.name]) for one in columns.groups])
+    left, entries = np.zeros(rows.size), []
+    for block in placed.blocks:
+        known, used = block.kernel.used
+        given = x[block.columns], block.values[known], np.tile(p[np.array(used, int)][:, None], block.count)
+        np.add.at(left, block.targets, block.kernel.functions["rows"](*given).full())
+        row, column = map(np.array, block.kernel.jacobian.get_triplet())
+        slopes = block.kernel.functions["jacobian"](*given).full()
+        entries.append((slopes.ravel(), block.targets[row].ravel(), block.columns[column].ravel()))
+    slopes, row, column = (np.concatenate(side) for side in zip(*entries, strict=True))
+    size = len(group.labels)
+    down, across = row - targets.start, column - group.start - size
+    mine = (down >= 0) & (down < targets.stop - targets.start - size) & (across >= 0) & (column < group.stop)
+    count = size * (group.count - 1)
+    matrix = sparse.coo_matrix((slopes[mine], (down[mine], across[mine])), shape=(count, count)).tocsc()
+    try:
+        found = splu(matrix).solve(-left[targets.start : targets.start + count])
+    except RuntimeError:
+        found = np.zeros(count)
+    s[1:] = np.where(np.isfinite(found), found, 0.0).reshape(-1, size)
+    shares, spreads = _regressed(program, s)
+    length = program.units.length
+    return {SENSITIVITY: s, SHARE: shares, SPREAD: np.where(spreads < LEAST * length, BEGIN * length, spreads)}
+
+
+def fisher(program: Any, path: Any) -> np.ndarray:
+    """The mean products of the sensitivities of a path to the start and to the numbers, a symmetric matrix."""
+    x = program.pack(path) * program.columns.scales()
+    return gram_of(program, program.columns[SENSITIVITY].of(x))
+
+
+def gram_of(program: Any, s: np.ndarray) -> np.ndarray:
+    """The mean products of sensitivities along the path, a symmetric matrix."""
+    table = s.reshape(len(s), len(ways_of(program.problem)), -1)
+    return np.einsum("k,kia,kja->ij", node_weights(program.mesh, program.scheme), table, table)
+
+
+def _regressed(program: Any, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The shares of the ways before it in the sensitivity to each number, and the size of what is left [m]."""
+    gram, first = gram_of(program, s), 2 * program.problem.dimension
+    shares, spreads = np.zeros(len(pairs(program.problem))), []
+    for k in range(first, len(gram)):
+        share = np.linalg.lstsq(gram[:k, :k], gram[:k, k], rcond=None)[0]
+        shares[[i for i, (own, _) in enumerate(pairs(program.problem)) if own == k]] = share
+        spreads.append(np.sqrt(max(gram[k, k] - gram[:k, k] @ share, 0.0)))
+    return shares, np.array(spreads)

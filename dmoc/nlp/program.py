@@ -20,6 +20,8 @@ from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
 from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
+from dmoc.nlp.lesson import SENSITIVITY, SPREAD, at_start
+from dmoc.nlp.placement import sensitivities
 from dmoc.nlp.units import Units
 from dmoc.parts.rows import alike, built_in, values_of
 from dmoc.scene.problem import TransferProblem
@@ -101,6 +103,9 @@ class Program:
             places = self.columns["position"].indices[:, place]
             _fix(lower, upper, places, position - origin)
             _fix(lower, upper, self.columns[f"{name}.velocity"].indices[:, 0], velocity)
+        if SENSITIVITY in self.columns:
+            _fix(lower, upper, self.columns[SENSITIVITY].indices[:, 0], at_start(problem))
+            put(SPREAD, 0.0, np.inf)
         scale = self.columns.scales()
         return lower / scale, upper / scale
 
@@ -177,6 +182,8 @@ class Program:
             if path.reaction is None
             else path.reaction,
         }
+        if SENSITIVITY in self.columns:
+            values |= sensitivities(self, values, self.parameters(self.problem))
         return self.scaled(values, np.ravel, np.concatenate)
 
     def unpack(self, x: np.ndarray, problem: TransferProblem) -> DiscretePath:

@@ -24,6 +24,7 @@ from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.draft import ALL, Draft
 from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
+from dmoc.nlp.lesson import Lesson
 from dmoc.parts.rows import Row, built_in, title, with_symbols
 from dmoc.scene.problem import TransferProblem
 
@@ -85,6 +86,7 @@ class Writer:
         for part in unknown:
             problem = with_field(problem, "inertia", part.moments)
         self.dynamics = Dynamics.of(problem, self.effects)
+        self.lesson = Lesson(self) if problem.objective.learns else None
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import casadi as ca
-
-from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
+from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Duties
 from dmoc.parts.actuator import Actuator
 
@@ -87,6 +85,8 @@ class Objective(Duties):
     # Whether it looks at the attitude of a body, and whether it needs its position.
     turns_body: ClassVar[bool] = False
     moves_body: ClassVar[bool] = False
+    # The numbers on which it counts information: their sensitivities are then unknowns of the optimisation.
+    learns: ClassVar[tuple[str, ...]] = ()
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the objective has no meaning in this many dimensions."""
@@ -105,6 +105,10 @@ class Objective(Duties):
 
     def kick(self, size: Any, mass: Any) -> Any:
         """Cost of an impulse between two legs: a velocity change [m/s] of a mass [kg]."""
+        return 0
+
+    def told(self, spreads: Any, duration: Any) -> Any:
+        """Value of what positions will tell, from how far each number moves the path: see `Information`."""
         return 0
 
     def unit_with(self, actuator: Actuator) -> str:
@@ -173,62 +177,6 @@ class FinalMass(Objective):
 
 
 @dataclass(frozen=True)
-class FinalRadius(Objective):
-    """Largest distance from a centre at the goal [m].
-
-    Parameters
-    ----------
-    center : sequence of float, optional
-        [m]; the origin if not given.
-    """
-
-    center: Vector | None = None
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[int] = -1
-    moves_body: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        if self.center is not None:
-            checked(self, center=vector("center", self.center, "m"))
-
-    def check_dimension(self, dimension: int) -> None:
-        if self.center is not None and len(self.center) != dimension:
-            raise ValueError(
-                f"FinalRadius: center has {len(self.center)} entries but the problem has {dimension} dimensions"
-            )
-
-    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        offset = q if self.center is None else q - ca.DM(self.center)
-        return ca.sqrt(ca.dot(offset, offset))
-
-
-@dataclass(frozen=True)
-class FinalHeight(Objective):
-    """Largest coordinate along one axis at the goal [m].
-
-    Parameters
-    ----------
-    axis : int
-        Which one, counted from 0; the last if not given.
-    """
-
-    axis: int = -1
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[int] = -1
-    moves_body: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        checked(self, axis=whole("FinalHeight: axis", self.axis, least=-3))
-
-    def check_dimension(self, dimension: int) -> None:
-        if self.axis not in range(-dimension, dimension):
-            raise ValueError(f"FinalHeight: axis must be 0 to {dimension - 1} or -1; got {short(self.axis)}")
-
-    def terminal(self, t: Any, q: Any, v: Any, m: Any) -> Any:
-        return q[self.axis]
-
-
-@dataclass(frozen=True)
 class WeightedSum(Objective):
     """A sum of objectives with weights; made by adding objectives and multiplying them by numbers.
 
@@ -247,6 +195,8 @@ class WeightedSum(Objective):
             raise ValueError(f"WeightedSum: parts must be pairs (weight, objective); got {short(self.parts)}")
         parts = tuple((number("weight", weight, ""), term) for weight, term in pairs)
         checked(self, parts=parts)
+        if sum(bool(term.learns) for weight, term in self.parts if weight) > 1:
+            raise ValueError("a sum of objectives has one Information; give it all numbers: unknown=(.., ..)")
         pulls = {weight * term.sense > 0 for weight, term in self.parts if weight}
         if len(pulls) > 1:
             raise ValueError(
@@ -289,6 +239,13 @@ class WeightedSum(Objective):
 
     def kick(self, size: Any, mass: Any) -> Any:
         return sum(weight * term.kick(size, mass) for weight, term in self.parts if weight)
+
+    @property
+    def learns(self) -> tuple[str, ...]:  # type: ignore[override]
+        return tuple(name for weight, term in self.parts if weight for name in term.learns)
+
+    def told(self, spreads: Any, duration: Any) -> Any:
+        return sum(weight * term.told(spreads, duration) for weight, term in self.parts if weight)
 
     def unit_with(self, actuator: Actuator) -> str:
         units = {term.unit_with(actuator) for weight, term in self.parts if weight}

@@ -21,6 +21,7 @@ from dmoc.links.system import System
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
+from dmoc.parts.largest import learned_opened
 from dmoc.parts.objectives import Effort, FinalMass, Objective, Time
 from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
@@ -110,6 +111,7 @@ class TransferProblem(Named):
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ValueError(f"{name} must be a dmoc.{kind.__name__}; got {short(getattr(self, name))}")
+        checked(self, effects=learned_opened(self))
         checked(self, **with_both(self.inertia, self.start, self.goal))
         checked(self, **with_wheels(self.actuator, self.start, self.goal, tuple(self.constraints)))
         checked(self, **turning_checked(self.system, self.inertia, self.start, self.goal))
@@ -117,14 +119,12 @@ class TransferProblem(Named):
         if self.objective.metered:
             checked(self, actuator=self.actuator.metered(self.dimension))
         if self.start.dimension != self.goal.dimension:
-            raise ValueError(
-                f"start has {self.start.dimension} axes but goal has {self.goal.dimension}; give both the same"
-            )
+            sizes = f"start has {self.start.dimension} axes but goal has {self.goal.dimension}"
+            raise ValueError(f"{sizes}; give both the same")
         parts: tuple[Any, ...] = (*self.effects, *self.constraints, self.actuator, self.objective)
-        for link in self.links:
-            link.check_dimension(self.dimension)
-        for part in parts:
+        for part in (*self.links, *parts):
             part.check_dimension(self.dimension)
+        for part in parts:
             check_acts_on(part, self.turns, self.start.has_position)
         self._check_clock()
         check_limited(self)

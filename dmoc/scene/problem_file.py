@@ -162,7 +162,7 @@ def load_problem(name: str) -> ProblemFile:
     return ProblemFile(path.stem, path, docstring, tuple(parameters), digest, function)
 
 
-def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
+def parse_settings(settings: Iterable[str], option: str = "--set") -> dict[str, Any]:
     """Values from texts such as `mass=2.5` or `goal=(8, 1, 1)`, parsed as Python literals.
 
     Raises
@@ -175,15 +175,15 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
         name, equals, text = setting.partition("=")
         name = name.strip()
         if not equals or not name.isidentifier():
-            raise ValueError(f"--set {setting!r} is not of the form name=value, for example --set mass=2.5")
+            raise ValueError(f"{option} {setting!r} is not of the form name=value, as in {option} mass=2.5")
         if name in values:
-            raise ValueError(f"--set gives {name!r} twice; give it once")
+            raise ValueError(f"{option} gives {name!r} twice; give it once")
         try:
             values[name] = ast.literal_eval(text.strip())
         except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
             raise ValueError(
-                f"--set {name}: {_short(text)} is not a Python literal; write a number without a unit (2.5), "
-                "a tuple ('(8, 1, 1)'), True, None or a quoted text"
+                f"{option} {name}: {_short(text)} is not a Python literal; write a number without a unit "
+                "(2.5), a tuple ('(8, 1, 1)'), True, None or a quoted text"
             ) from None
     return values
 

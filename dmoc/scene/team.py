@@ -226,6 +226,8 @@ def _member(index: int, given: Any) -> TransferProblem:
         )
     if not isinstance(one, TransferProblem):
         raise ValueError(f"members[{index}] must be a dmoc.TransferProblem; got {short(given)}")
+    if one.objective.learns:
+        raise ValueError(f"members[{index}] has Information as its objective, which is one of a transfer alone")
     if one.system is not None or one.links:
         raise ValueError(
             f"members[{index}] has links or several bodies of its own, and a body of a team has none; "

@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.special import betaincinv
 
-from dmoc.basics.arguments import entries, number, of_kind, short, whole
-from dmoc.configurations.coordinates import PLACE
-from dmoc.motion.dynamics import Dynamics
-from dmoc.results.solution import Outcome, Solution
-from dmoc.sensitivity.flights import Flights
+from dmoc.basics.arguments import entries, flag, number, short, whole
+from dmoc.sensitivity.feedback import flights_of, gains_of
 
 # A limit counts as broken beyond this part of the extent of the path, or of the mean speed [-]: a plan may
 # lie right on it.
@@ -103,15 +100,17 @@ def disperse(
     mass: float = 0.0,
     samples: int = 1000,
     seed: int = 0,
+    force_noise: float = 0.0,
+    feedback: bool = False,
 ) -> Dispersion:
-    """Fly the forces of a solution many times with errors, open loop.
+    """Fly the forces of a solution many times with errors, open loop or with a linear feedback.
 
     Errors are normally distributed. Those of force, pointing and mass are drawn once a flight and last for all
-    of it; propellant burns as planned. Flights are those of the variational scheme on the mesh of the solution.
-    The covariance is that of the linear map of the errors, P <- A P A' with the Jacobian A of each step
-    (Maybeck, Stochastic Models, Estimation, and Control 1, 1979), which is symplectic as the step is. Each kind
-    of error has random numbers of its own: leaving one out changes no other, and more samples only come behind
-    the ones before.
+    of it, noise of the force is drawn anew in each step; propellant burns as planned. Flights are those of the
+    variational scheme on the mesh of the solution. The covariance is that of the linear map of the errors, P <-
+    A P A' + Q with the Jacobian A of each step and the noise Q that it adds (Maybeck, Stochastic Models,
+    Estimation, and Control 1, 1979), which is symplectic as the step is. Each kind of error has random numbers
+    of its own: leaving one out changes no other, and more samples only come behind the ones before.
 
     Parameters
     ----------
@@ -130,13 +129,21 @@ def disperse(
         Flights, at least 2.
     seed : int
         The same seed gives the same flights.
+    force_noise : float
+        Standard deviation of a further force along each axis [N], another one in each step. White noise of the
+        power spectral density S [N^2 s] has sqrt(S / h) in a step that lasts h.
+    feedback : bool
+        Whether the force answers how far a flight is off the plan at the begin of each step, as `feedback`
+        says; limits of the actuator are not kept.
 
     Raises
     ------
     ValueError
         If the solution is not of one body that does not turn, or an argument has no meaning.
     """
-    flights = _flights(solution)
+    flights = flights_of(solution)
+    if flag("feedback", feedback):
+        flights = flights.with_feedback(gains_of(solution, flights))
     axes = flights.axes
     whole("samples", samples, least=2)
     whole("seed", seed, least=0)
@@ -150,7 +157,12 @@ def disperse(
             for stream, sigma in enumerate(sigmas)
         ]
     )
-    position, velocity = flights.flown(errors)
+    sigma = number("force_noise", force_noise, "N", nonnegative=True)
+    noise = None
+    if sigma:
+        drawn = np.random.default_rng([seed, len(sigmas)])
+        noise = sigma * drawn.standard_normal((samples, flights.steps, axes))
+    position, velocity = flights.flown(errors, noise)
     if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
         raise ValueError("a flight with these errors ends where the scheme has no solution; give smaller ones")
     slopes = flights.slopes() * np.concatenate(sigmas)
@@ -165,28 +177,11 @@ def disperse(
         position[:, ends],
         velocity[:, ends],
         (planned[0][0, ends], planned[1][0, ends]),
-        slopes @ slopes.transpose(0, 2, 1),
+        slopes @ slopes.transpose(0, 2, 1) + (flights.process(sigma) if sigma else 0.0),
         _chances(solution, position, velocity),
         tuple((part, float(np.quantile(off[0], part)), float(np.quantile(off[1], part))) for part in PARTS),
         seed,
     )
-
-
-def _flights(solution: Any) -> Flights:
-    """The flights of a solution, or a line that says why there are none."""
-    of_kind("solution", solution, Outcome)
-    problem = solution.require_problem()
-    if not isinstance(solution, Solution):
-        raise ValueError("disperse takes the solution of one transfer, not that of a mission or of a team")
-    if not solution.optimal:
-        raise ValueError(f"disperse needs a path that can be flown; this solve ended with {solution.status!r}")
-    blocks = Dynamics.of(problem).configuration.coordinates.blocks
-    if len(blocks) != 1 or blocks[0].kind != PLACE or problem.links:
-        raise ValueError(
-            "disperse flies one body that does not turn; this problem has attitudes, links or more bodies"
-        )
-    solution.path.refuse_unusable("solution")
-    return Flights(problem, solution.path)
 
 
 def _sigmas(axes: int, start: Any, force: Any, pointing: Any, mass: Any) -> list[np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -28,11 +29,13 @@ class Flights:
 
     An error is a column: position [m], velocity [m/s], force (relative), turn of the force about each axis of
     space (of the plane one) [rad], mass (relative to that at the start). Those of force, turn and mass are the
-    same all the way. Propellant burns as planned.
+    same all the way. A further force along each axis [N] may be another one in each step. Propellant burns as
+    planned.
     """
 
     problem: TransferProblem
     path: DiscretePath
+    gains: np.ndarray | None = None
 
     @property
     def axes(self) -> int:
@@ -63,17 +66,23 @@ class Flights:
         plain = replace(self.problem, actuator=FreeForce(), objective=Effort(), constraints=())
         return Dynamics.of(plain)
 
-    def flown(self, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s] at all nodes, shape (samples, nodes, axes)."""
+    def flown(self, errors: np.ndarray, noise: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s] at all nodes, shape (samples, nodes, axes).
+
+        The noise has shape (samples, steps, axes).
+        """
         march, inputs = self._march()
         begin = self._begin()
         found = []
         for first in range(0, len(errors), AT_ONCE):
             some = errors[first : first + AT_ONCE]
             states = begin.map(len(some))(some.T).full()
-            _, moved, speeds = march.map("flights", "serial", len(some), list(range(1, 1 + len(inputs))), [])(
-                states, *inputs
-            )
+            shared, own = list(range(1, 1 + len(inputs))), np.zeros((self.axes, self.steps))
+            if noise is None:
+                shared.append(1 + len(inputs))
+            else:
+                own = noise[first : first + AT_ONCE].reshape(-1, self.axes).T
+            _, moved, speeds = march.map("flights", "serial", len(some), shared, [])(states, *inputs, own)
             found.append([self._by_sample(part.full(), len(some)) for part in (moved, speeds)])
         moved, speeds = (np.concatenate(part) for part in zip(*found, strict=True))
         start = (
@@ -83,28 +92,68 @@ class Flights:
         position = np.concatenate([start[0], moved], axis=1) + self.path.position[0]
         return position, np.concatenate([start[1], speeds], axis=1)
 
+    @property
+    def steps(self) -> int:
+        return len(self.path.mesh) - 1
+
+    @cached_property
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States at the step ends of the planned path, and each step's slopes by its state and by its noise.
+
+        Of shapes (steps+1, state), (steps, state, state) and (steps, state, axes).
+        """
+        march, inputs = self._march()
+        step, steps, still = self._step(), self.steps, np.zeros((self.axes, self.steps))
+        states = np.zeros((self._state, steps + 1))
+        states[:, :1] = self._begin()(np.zeros(self.size)).full()
+        states[:, 1:] = march(states[:, 0], *inputs, still)[0].full()
+        given = [ca.MX.sym(f"w{i}", *step.size_in(i)) for i in range(step.n_in())]
+        after = step(*given)[0]
+        both = [ca.densify(ca.jacobian(after, one)) for one in (given[0], given[-1])]
+        found = ca.Function("jacobian", given, both).map(steps)(states[:, :-1], *inputs, still)
+        along, across = (part.full().reshape(self._state, steps, -1).transpose(1, 0, 2) for part in found)
+        return states.T, along, across
+
+    @cached_property
+    def begin_slopes(self) -> np.ndarray:
+        """Derivatives of the state at the start by an error."""
+        first = ca.MX.sym("e", self.size)
+        slopes = ca.Function("start", [first], [ca.densify(ca.jacobian(self._begin()(first), first))])
+        return slopes(np.zeros(self.size)).full()
+
+    def process(self, sigma: float) -> np.ndarray:
+        """Covariance of positions and velocities by noise of the force, (steps+1, 2 axes, 2 axes).
+
+        P <- A P A' + sigma^2 B B' with the Jacobians A and B of each step by its state and by its noise.
+        """
+        states, along, across = self.linear
+        found = [np.zeros((self._state, self._state))]
+        for a, b in zip(along, across, strict=True):
+            found.append(a @ found[-1] @ a.T + sigma**2 * (b @ b.T))
+        seen = self._of_velocity(states.T)
+        return seen @ np.array(found) @ seen.transpose(0, 2, 1)
+
     def slopes(self) -> np.ndarray:
         """Derivatives of positions and velocities at the step ends by an error, (steps+1, 2 axes, size).
 
         The product of the Jacobians of all steps up to there, each at the planned path.
         """
-        march, inputs = self._march()
-        step = self._step()
-        states = np.hstack([np.zeros((self._state, 1)), np.zeros((self._state, len(self.path.mesh) - 1))])
-        states[:, :1] = self._begin()(np.zeros(self.size)).full()
-        states[:, 1:] = march(states[:, 0], *inputs)[0].full()
-        given = [ca.MX.sym(f"w{i}", *step.size_in(i)) for i in range(step.n_in())]
-        jacobian = ca.Function("jacobian", given, [ca.jacobian(step(*given)[0], given[0])])
-        steps = len(self.path.mesh) - 1
-        along = jacobian.map(steps)(states[:, :-1], *inputs)
+        states, along, _ = self.linear
         # S_(k+1) = A_k S_k, as P_(k+1) = A_k P_k A_k' for the covariance of a state that holds the errors too.
-        before, a = ca.MX.sym("S", self._state, self.size), ca.MX.sym("A", self._state, self._state)
-        product = ca.Function("product", [before, a], [a @ before]).mapaccum(steps)
-        first = ca.MX.sym("e", self.size)
-        start = ca.Function("start", [first], [ca.jacobian(self._begin()(first), first)])(np.zeros(self.size))
-        all_of = np.hstack([ca.densify(start).full(), product(start, ca.densify(along)).full()])
-        table = all_of.reshape(self._state, steps + 1, self.size).transpose(1, 0, 2)
-        return self._of_velocity(states) @ table
+        found = [self.begin_slopes]
+        for a in along:
+            found.append(a @ found[-1])
+        return self._of_velocity(states.T) @ np.array(found)
+
+    def with_feedback(self, gains: np.ndarray) -> Flights:
+        """The same flights, whose force answers how far they are off the plan at the begin of each step."""
+        return replace(self, gains=gains)
+
+    def momentum_slopes(self) -> np.ndarray:
+        """Derivatives of position and momentum per mass by position and velocity at the begin of each step."""
+        n, states = self.axes, self.linear[0]
+        back = self._of_velocity(states.T)[:-1, :, : 2 * n]
+        return np.linalg.inv(back)
 
     @property
     def _state(self) -> int:
@@ -147,19 +196,32 @@ class Flights:
             force = force[at.T].reshape(at.size, self.axes)
         times = self.problem.start_time + path.duration * path.mesh[:-1]
         inputs = [path.mass[at], force.T, times[None], path.duration * np.diff(path.mesh)[None]]
+        if self.gains is not None:
+            planned = replace(self, gains=None).linear[0][:-1, : 2 * self.axes]
+            inputs += [planned.T, self.gains.transpose(1, 0, 2).reshape(self.axes, -1)]
         return self._step().mapaccum("flight", steps), inputs
 
     def _step(self) -> ca.Function:
-        """(state, masses, forces, t, h) -> the state one step later, moves and velocities at its nodes."""
+        """(state, masses, forces, t, h, noise) -> the state after a step, moves and velocities at its nodes.
+
+        With feedback the planned position and momentum and the gains stand before the noise.
+        """
         n, rule, path = self.axes, self.rule, self.path
         state = ca.MX.sym("state", self._state)
         masses = ca.MX.sym("masses", rule.degree + 1)
         forces = ca.MX.sym("forces", n, 1 if path.hold else rule.degree + 1)
-        t, h = ca.MX.sym("t"), ca.MX.sym("h")
+        t, h, noise = ca.MX.sym("t"), ca.MX.sym("h"), ca.MX.sym("noise", n)
         ends = np.cumsum([0, *self.parts.values()]).tolist()
         r, p, push, turn, heavier = ca.vertsplit(state, ends)
         dynamics = self.free
-        exerted = (1 + push) * (_turned(turn, n) @ forces)
+        answers = []
+        if self.gains is not None:
+            answers = [ca.MX.sym("planned", 2 * n), ca.MX.sym("gains", n, 2 * n)]
+            more = answers[1] @ (ca.vertcat(r, p) - answers[0])
+            commanded = forces + ca.repmat(more, 1, forces.shape[1])
+        else:
+            commanded = forces
+        exerted = (1 + push) * (_turned(turn, n) @ commanded) + ca.repmat(noise, 1, forces.shape[1])
         dq, dp, v = step_map(dynamics, rule, path.hold)(
             r, p, masses + path.mass[0] * heavier, exerted, t, h, path.position[0]
         )
@@ -172,7 +234,7 @@ class Flights:
         speeds = ca.vertcat(ca.vec(v[:, 1:-1]), speed)
         made = ca.Function(
             "step",
-            [state, masses, forces, t, h],
+            [state, masses, forces, t, h, *answers, noise],
             [ca.vertcat(r + dq, p + dp, state[2 * n :]), moved, speeds],
         )
         return made.expand() if rule.degree == 1 and not dynamics.depends_on_velocity else made

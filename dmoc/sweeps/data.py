@@ -53,13 +53,22 @@ COLUMNS = {
     "verify_s": Column(np.nan, "s", "time spent on checks"),
 }
 # Paths are a variable of the result where they are kept; empty where not solved.
-PATH = Column("", "1", "path, controls and multipliers of the answer, packed")
+PATH = {"path": Column("", "1", "path, controls and multipliers of the answer, packed")}
+# Variables of flights with errors, where these are asked for.
+FLIGHTS = {
+    "miss": Column(np.nan, "m", "95 of 100 flights with errors end nearer to the goal than this"),
+    "miss_speed": Column(np.nan, "m s-1", "95 of 100 flights differ less from the velocity there"),
+    "broken": Column(np.nan, "1", "part of flights that break the limit that is broken most often"),
+}
 
 
 def sweep_dataset(
-    plan: Plan, records: Sequence[Mapping[str, Any]], facts: Mapping[str, Any], keeps: bool = False
+    plan: Plan,
+    records: Sequence[Mapping[str, Any]],
+    facts: Mapping[str, Any],
+    more: Mapping[str, Column] | None = None,
 ) -> Dataset:
-    """The dataset of all records, in the order of the points; with their paths if it `keeps` them.
+    """The dataset of all records, in the order of the points; with `more` variables than `COLUMNS`.
 
     A result that has the name of a swept parameter is called found_<name>.
     """
@@ -73,7 +82,7 @@ def sweep_dataset(
         about = {"units": _netcdf_unit(parameter.unit), "long_name": parameter.description or parameter.name}
         coordinates[parameter.name] = (dimensions if plan.sampled else dimensions[i : i + 1], values, about)
     variables: dict[str, Any] = {}
-    for name, column in (COLUMNS | ({"path": PATH} if keeps else {})).items():
+    for name, column in (COLUMNS | dict(more or {})).items():
         given = [record.get(name) for record in records]
         filled = [column.empty if value is None else value for value in given]
         kind = object if isinstance(column.empty, str) else type(column.empty)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.basics.arguments import short
 from dmoc.basics.compiled import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
-from dmoc.sweeps.data import as_attributes, sweep_dataset, write_sweep
+from dmoc.sweeps.data import FLIGHTS, PATH, as_attributes, sweep_dataset, write_sweep
 from dmoc.sweeps.journal import Journal
 from dmoc.sweeps.loop import Sweep, SweepProgress
 from dmoc.sweeps.plan import Plan, make_plan
@@ -41,6 +42,7 @@ def sweep(
     hold: bool = False,
     follow: bool = False,
     keep: str | None = None,
+    errors: Mapping[str, Any] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
@@ -81,6 +83,9 @@ def sweep(
     keep : str
         "paths": the file holds the path of every answer, too, a few kilobytes each, so that a point of it can
         be a guess or a picture (`dmoc solve --guess map.nc:duration=12`, `dmoc plot map.nc:duration=12`).
+    errors : mapping
+        Arguments of `disperse`, as {"start": (0.01, 0.001), "force": 0.01, "samples": 200}: every answer is
+        flown with errors, and the result has the variables miss, miss_speed and broken, too.
     workers : int
         Processes; as many as there are cores if not given.
     scheduler : str
@@ -118,13 +123,14 @@ def sweep(
     if keep not in (None, "paths"):
         raise ValueError(f"keep must be 'paths' or nothing; got {keep!r}")
     numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold}
-    facts = _facts(file, plan, fixed, numerics | {"follow": follow})
+    known = _errors(errors)
+    facts = _facts(file, plan, fixed, numerics | {"follow": follow} | ({"errors": known} if known else {}))
     if plan.sampled:
         facts |= {"method": method, "seed": seed}
 
     def task(point: int, start: str | None, again: bool) -> Task:
         values = fixed | plan.at(point)
-        return Task(str(file.path.resolve()), file.source_hash, values, numerics, start, again)
+        return Task(str(file.path.resolve()), file.source_hash, values, numerics, start, again, known)
 
     with Journal(out, facts | {"vary": plan.listing()}, restart) as journal:
         with _pool(workers, scheduler) as pool:
@@ -136,10 +142,25 @@ def sweep(
         created = {"created": datetime.now(UTC).isoformat(timespec="seconds")}
         if keep is not None:
             records = [record | {"path": under_way.path(point)} for point, record in enumerate(records)]
-        data = sweep_dataset(plan, records, as_attributes(facts) | created, keep is not None)
+        more = (PATH if keep is not None else {}) | (FLIGHTS if known is not None else {})
+        data = sweep_dataset(plan, records, as_attributes(facts) | created, more)
         write_sweep(data, out)
         journal.remove()
     return data
+
+
+def _errors(given: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Arguments of `disperse`, or a line that says which there are."""
+    if given is None:
+        return None
+    from inspect import signature
+
+    from dmoc.sensitivity.dispersion import disperse
+
+    names = [name for name in signature(disperse).parameters if name != "solution"]
+    if strange := [name for name in given if name not in names]:
+        raise ValueError(f"no error is called {short(strange[0])}; there are {', '.join(names)}")
+    return dict(given)
 
 
 def _pool(workers: int | None, scheduler: str | None) -> Pool:

@@ -47,6 +47,8 @@ class Task:
         The path of a neighbour, from `pack`.
     again : bool
         Whether the problem's own guess has failed already.
+    errors : dict or None
+        Arguments of `disperse`, if flights with errors are asked for.
     """
 
     path: str
@@ -55,6 +57,7 @@ class Task:
     numerics: dict[str, Any]
     start: str | None = None
     again: bool = False
+    errors: dict[str, Any] | None = None
 
 
 def solve_point(task: Task) -> tuple[dict[str, Any], str | None]:
@@ -70,7 +73,10 @@ def solve_point(task: Task) -> tuple[dict[str, Any], str | None]:
         try:
             problem = file.make(**task.values)
             solution, warm = _solve(problem, task)
-            return _record_of(solution, warm), pack(solution.path) if solution.success else None
+            record = _record_of(solution, warm)
+            if task.errors is not None and solution.success:
+                record |= _dispersed(solution, task.errors)
+            return record, pack(solution.path) if solution.success else None
         except ValueError as error:
             return failed_record("refused", error), None
         except Exception as error:  # a user's own effect can raise anything
@@ -182,6 +188,16 @@ def _record_of(solution: Any, warm: bool) -> dict[str, Any]:
         **_worst(verdict),
         "verify_s": time.perf_counter() - begun,
     }
+
+
+def _dispersed(solution: Any, errors: dict[str, Any]) -> dict[str, float]:
+    """How far flights with errors come off, and how often they break a limit."""
+    from dmoc.sensitivity.dispersion import SURE, disperse
+
+    found = disperse(solution, **errors)
+    _, away, fast = next(entry for entry in found.miss if entry[0] == SURE)
+    broken = max((chance.value for chance in found.chances.values()), default=0.0)
+    return {"miss": away, "miss_speed": fast, "broken": broken}
 
 
 def _efforts(solution: Any) -> dict[str, float]:

@@ -16,12 +16,14 @@ from dmoc import (
     Impulse,
     KeepOut,
     Leg,
+    LinearDrag,
     Mission,
     Moving,
     PointGravity,
     Pose,
     State,
     UniformGravity,
+    Unknown,
     Via,
     Wrench,
     export,
@@ -79,6 +81,12 @@ def gates(duration=2.0, radius=0.3):
     return Mission(1.0, State((0, 0), (0, 0)), State((2, 0), (0, 0)), legs, duration=duration)
 
 
+def through_air(drag=0.3, duration=3.0):
+    """Whose drag is not known well."""
+    legs = [Leg(duration), Via((2, 1)), Leg(3.0)]
+    return Mission(2.0, State((0, 0), (0, 0)), State((4, 1), (0, 0)), legs, [LinearDrag(Unknown(drag))])
+
+
 def circles(radius=2.0):
     ends = CircularOrbit(1.0, mu=1.0, center=(0, 0)), CircularOrbit(radius, mu=1.0)
     return Mission(1.0, *ends, [Impulse(), Coast((1, 60)), Impulse()], [PointGravity(1.0)], objective=DeltaV())
@@ -134,6 +142,7 @@ def test_the_exported_solver_gives_the_answer_of_solve(make):
         (planets, {"start_time": 0.3, "coast_1_duration": 3.1, "mass": 2.0}, planets(0.3, 3.1, 2.0)),
         (gates, {"duration": 2.2, "home_keep_out_1_radius": 0.35}, gates(2.2, 0.35)),
         (circles, {"goal_radius": 2.2}, circles(2.2)),
+        (through_air, {"linear_drag_1_coefficient": 0.4}, through_air(0.4)),
     ],
 )
 def test_the_exported_solver_answers_for_other_numbers(make, numbers, other):

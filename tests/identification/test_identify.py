@@ -7,6 +7,7 @@ import pytest
 
 from dmoc import (
     BallForce,
+    Engine,
     Flight,
     KeepOut,
     LinearDrag,
@@ -275,6 +276,105 @@ def test_thrusters_and_the_centre_of_mass():
     assert [found.values[f"strength.thruster_{i + 1}"] for i in range(count)] == pytest.approx(strong, abs=1e-6)
     plan = plan_for(found, goal=Pose((1, 0, 0), (0, 0, 0), (1, 0, 0, 0)), duration=9, start=Pose((0, 0, 0)))
     assert plan.actuator.positions[0] == pytest.approx(np.array(places[0]) - center, abs=1e-6)
+
+
+def test_directions_of_single_thrusters():
+    """Two are turned from where they should point; what they push stays as large."""
+    places, ways = (
+        [(0.15, 0.1, 0), (0.15, -0.1, 0.05), (-0.15, 0.1, 0), (0, 0.15, 0.1)],
+        [(-1, 0, 0), (0, 1, 0), (0.8, 0, 0.6), (0, 0, 1)],
+    )
+    real = [np.array(way, float) for way in ways]
+    real[0] += (0, 0.06, -0.04)
+    real[2] += (0, 0.05, 0)
+    flown = cube(
+        60, actuator=Thrusters(places, real, max_thrust=1.0), forces=pushes(60, 4, 0.3, every=4, seed=2)
+    )
+    stated = Thrusters(places, ways, max_thrust=1.0)
+    known = {"mass": 9.6, "inertia": (0.15, 0.14, 0.16), "actuator": stated, "order": 6}
+    tilt = [Unknown((0, 0)), (0, 0), Unknown((0, 0.0)), (0, 0)]
+    found = identify(flown, **known, tilt=tilt, noise=1e-3, attitude_noise=1e-3)
+    assert found.names == (
+        "tilt.thruster_1.y",
+        "tilt.thruster_1.z",
+        "tilt.thruster_3.y",
+        "tilt.thruster_3.z",
+    )
+    assert list(found.values.values()) == pytest.approx([0.06, -0.04, 0.05, 0.0], abs=1e-5)
+    ways_found = np.array(found.problem.actuator.directions)
+    assert np.linalg.norm(ways_found, axis=1) == pytest.approx(1.0)
+    assert ways_found == pytest.approx(np.array([way / np.linalg.norm(way) for way in real]), abs=1e-5)
+    every = identify(flown, **known, tilt=Unknown((0, 0), sigma=0.1), noise=1e-3, attitude_noise=1e-3)
+    assert len(every.names) == 8 and every.success
+    with pytest.raises(ValueError, match="tilt must be two numbers, or two for each of 4"):
+        identify(flown, **known, tilt=[Unknown((0, 0))], noise=1e-3, attitude_noise=1e-3)
+    with pytest.raises(ValueError, match="tilt needs Thrusters"):
+        identify(flight(), mass=Unknown(10), tilt=(0, 0))
+
+
+def burning(seed=1, **changes):
+    """A quarter of the mass is burnt in forty seconds."""
+    commands = pushes(81, 2, 5.0, every=5, seed=seed)
+    known = {"mass": 20.0, "effects": [LinearDrag(0.7)], "actuator": Engine(10, exhaust_velocity=50.0)}
+    return fly(0.5 * np.arange(81), commands, State((0, 0), (0.1, 0)), **(known | changes))
+
+
+def test_propellant_burns_along_the_flight():
+    flown, thought = burning(), Engine(10, exhaust_velocity=Unknown(30.0))
+    assert flown.forces.shape[1] == 2
+    found = identify(flown, **asked(offset=None, actuator=thought), order=6)
+    truth = [20.0, 0.7, 50.0]
+    assert [found.values[name] for name in ("mass", DRAG, "exhaust_velocity")] == pytest.approx(truth, rel=1e-5)
+    burnt = 0.5 * np.cumsum(np.linalg.norm(flown.forces[:-1], axis=1)) / 50.0
+    assert burnt[-1] > 3 and found.mass == pytest.approx(20 - np.append(0, burnt), rel=1e-5)
+    plan = plan_for(found, goal=State((0, 0), (0, 0)), duration=60.0)
+    assert plan.mass == found.mass[-1] and plan.actuator.exhaust_velocity == pytest.approx(50.0, rel=1e-5)
+    assert not is_unknown(plan.actuator.exhaust_velocity)
+    kept = plan_for(found, replace(plan, actuator=BallForce(1.0)))
+    assert kept.actuator == BallForce(1.0)
+    # One that believes in a constant mass is told that something is wrong.
+    wrong = identify(flown, **asked(offset=None), order=6)
+    assert abs(wrong.values["mass"] - 20) > 1 and "times as large as the stated noise" in wrong.remarks[0]
+
+
+def test_a_known_mass_that_burns_and_measured_velocities():
+    """The mass at the start is exact then; velocities are those of a lighter body further on."""
+    flown = burning(velocity_noise=1e-4, noise=1e-3)
+    thought = Engine(10, exhaust_velocity=Unknown(30.0))
+    given = {"effects": [LinearDrag(0.7)], "actuator": thought, "noise": 1e-3}
+    slow = identify(flown, mass=20.0, **given)
+    fast = identify(flown, mass=20.0, **given, velocity_noise=1e-4)
+    assert fast.mass[0] == 20.0 and fast.sigma["exhaust_velocity"] < 0.8 * slow.sigma["exhaust_velocity"]
+    low, high = fast.interval(0.999)["exhaust_velocity"]
+    assert low < 50.0 < high and fast.fitting > 0.01
+
+
+def test_a_turned_engine_and_what_it_cannot_burn():
+    turn = identify(
+        burning(turn=0.05),
+        **asked(offset=None, mass=20.0, turn=Unknown(0.0)) | {"actuator": Engine(10, exhaust_velocity=50.0)},
+    )
+    assert turn.values["turn"] == pytest.approx(0.05, abs=1e-6)
+    with pytest.raises(ValueError, match="all propellant burns before the end"):
+        burning(mass=3.0)
+
+
+def test_thrusters_that_burn_turn_a_lighter_body():
+    """With a known mass: the inertia shrinks with it, and the plan begins with what is left."""
+    places = [(0.15, 0.1, 0), (0.15, -0.1, 0.05), (-0.15, 0.1, 0), (0, 0.15, 0.1)]
+    ways = [(-1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0.6, 0.8)]
+    engine = Thrusters(places, ways, max_thrust=1.0, exhaust_velocity=5.0)
+    commands = 0.15 + pushes(60, 4, 0.15, every=4, seed=2)
+    flown = cube(60, actuator=engine, forces=commands)
+    given = {"actuator": engine, "noise": 1e-3, "attitude_noise": 1e-3, "order": 6}
+    found = identify(flown, mass=9.6, inertia=Unknown((0.2, 0.2, 0.2)), **given)
+    assert [found.values[f"inertia.{axis}"] for axis in "xyz"] == pytest.approx((0.15, 0.14, 0.16), rel=1e-4)
+    rest = Pose((0, 0, 0))
+    plan = plan_for(found, start=rest, goal=Pose((1, 0, 0)), duration=9.0)
+    assert plan.mass < 8.5
+    assert plan.inertia[0][0] == pytest.approx(0.15 * plan.mass / 9.6, rel=1e-4)
+    with pytest.raises(ValueError, match="the mass at the start must be known"):
+        identify(flown, mass=Unknown(9.6), inertia=(0.15, 0.14, 0.16), **given)
 
 
 def test_the_estimate_goes_back_into_a_plan():

@@ -155,6 +155,7 @@ MAKES = {
     "GravityGradient": {"mu": 1.0, "center": (9, 0, 0), "place": None},
     "J2": {"mu": 1.0, "radius": 1.0, "j2": 1e-3},
     "Fixed": JOINT,
+    "Information": {"unknown": "mass", "noise": 0.001, "every": 0.1},
     "Impulse": {"limit": 2.0, "exhaust_velocity": 9.0},
     "JointDamper": {"joint": HINGE, "damping": 1.0},
     "JointForce": {"joint": Prismatic((1, 0, 0)), "limit": 2.0},
@@ -531,6 +532,8 @@ CALLS = {
             "seed": 1,
         },
     ),
+    "feedback": (dmoc.feedback, {}),
+    "foresee": (dmoc.foresee, {"unknown": "mass", "noise": 0.1, "every": 0.1}),
     "identify": (
         dmoc.identify,
         {

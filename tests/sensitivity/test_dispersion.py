@@ -14,17 +14,22 @@ from dmoc import (
     Fuel,
     KeepOut,
     LinearDrag,
+    Nozzles,
     PointGravity,
     RotatingFrame,
     SpeedLimit,
     State,
     TransferProblem,
     disperse,
+    feedback,
     simulate,
     solve,
+    transcribe,
     worth,
 )
 from dmoc.cli.app import main
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.mesh import node_fractions
 from dmoc.scene.problem_file import load_problem
 from dmoc.sensitivity.dispersion import interval
 from dmoc.sensitivity.flights import Flights
@@ -124,6 +129,88 @@ def test_the_documented_spread():
     assert found.sampled_sigma[-1] == pytest.approx(found.sigma[-1], rel=0.1)
 
 
+@pytest.mark.parametrize("order, hold", [(2, False), (4, True)])
+def test_noise_in_each_step(order, hold):
+    """Without effects a push F adds F h / m to the velocity, and half of that times h to the place."""
+    answer = solve(TransferProblem(**PLAIN), order=order, steps=20, hold=hold)
+    found = disperse(answer, force_noise=0.3, samples=2000, seed=3)
+    h, later = 0.25, 0.25 * np.arange(20)
+    kick = 0.3 * h / 2.0
+    speed, place = kick * np.sqrt(20), kick * np.sqrt(np.sum((later + h / 2) ** 2))
+    assert found.sigma[-1] == pytest.approx([place, place, speed, speed], rel=1e-9)
+    assert found.sampled_sigma[-1] == pytest.approx(found.sigma[-1], rel=0.06)
+    assert found.sigma[0] == pytest.approx(0, abs=1e-15)
+
+
+def test_noise_in_each_step_of_a_rough_flight():
+    """The linear covariance is that of differences of flights by the noise of every single step."""
+    answer = solve(TransferProblem(**ROUGH), order=4, steps=6)
+    flights, step = Flights(answer.problem, answer.path), 1e-5
+    pushed = np.zeros((36, 6, 3))
+    pushed[np.arange(36), np.arange(36) // 2 // 3, np.arange(36) // 2 % 3] = np.tile([step, -step], 18)
+    position, velocity = flights.flown(np.zeros((36, flights.size)), pushed)
+    states = np.concatenate([position, velocity], axis=2)[:, ::2]
+    slopes = (states[::2] - states[1::2]) / (2 * step)
+    expected = 0.04 * np.einsum("nki,nkj->kij", slopes, slopes)
+    assert flights.process(0.2) == pytest.approx(expected, abs=1e-9)
+    # It adds to what lasts, and each sample has noise of its own, the same whatever comes behind it.
+    both = disperse(answer, (0.01, 0.0), force_noise=0.2, samples=300, seed=1)
+    alone = disperse(answer, (0.01, 0.0), samples=300, seed=1)
+    assert both.covariance - alone.covariance == pytest.approx(expected, abs=1e-9)
+    more = disperse(answer, (0.01, 0.0), force_noise=0.2, samples=400, seed=1)
+    assert np.array_equal(more.position[:300], both.position)
+    assert not np.allclose(both.position[0], both.position[1])
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return solve(TransferProblem(**ROUGH), order=4, steps=20, hold=True)
+
+
+def test_feedback_is_a_new_plan_to_first_order(rough):
+    """At the start and on the way: the force of a plan from a state off the path, on the rest of the mesh."""
+    gains, step = feedback(rough), 1e-4
+    for k in (0, 8):
+        mesh = (rough.path.mesh[k:] - rough.path.mesh[k]) / (1 - rough.path.mesh[k])
+        left, begun = 3.0 * (1 - rough.path.mesh[k]), 3.0 * rough.path.mesh[k]
+        state = rough.position[2 * k], rough.velocity[k]
+        forces = []
+        for sign in (1, -1):
+            away = State(
+                tuple(state[0] + sign * np.array([0, step, 0])), tuple(state[1] + sign * np.array([step, 0, 0]))
+            )
+            problem = TransferProblem(**ROUGH | {"start": away, "duration": left, "start_time": begun})
+            nlp = transcribe(problem, order=4, mesh=mesh, hold=True)
+            known = begun + left * node_fractions(mesh, scheme(4)), rough.position[2 * k :]
+            forces.append(nlp.solve(guess=known).path.control[0])
+        slope = (forces[0] - forces[1]) / (2 * step)
+        assert gains[k] @ np.array([0, 1, 0, 1, 0, 0]) == pytest.approx(slope, rel=1e-4)
+
+
+def test_feedback_brings_flights_to_the_goal(rough):
+    errors = {"start": (0.01, 0.01), "force_noise": 0.05, "samples": 400}
+    alone, answered = (disperse(rough, **errors, feedback=on) for on in (False, True))
+    assert answered.sigma[-1].max() < 0.06 * alone.sigma[-1].max()
+    assert answered.sampled_sigma[-1] == pytest.approx(answered.sigma[-1], rel=0.15)
+    assert answered.sampled_sigma[10] == pytest.approx(answered.sigma[10], rel=0.15)
+    assert np.array_equal(alone.position[:, 0], answered.position[:, 0])
+
+
+def test_feedback_of_every_scheme_and_where_there_is_none():
+    for order, hold in ((2, False), (8, False)):
+        answer = solve(TransferProblem(**ROUGH), order=order, steps=20, hold=hold)
+        errors = {"start": (0.01, 0.01), "samples": 50}
+        ends = [disperse(answer, **errors, feedback=on).sigma[-1].max() for on in (False, True)]
+        assert ends[1] < 0.1 * ends[0]
+    free = solve(TransferProblem(**PLAIN | {"start": State((0, 0), (None, 0))}), order=4, steps=10)
+    with pytest.raises(ValueError, match="feedback needs a start whose position and velocity"):
+        feedback(free)
+    ways = [(1, 0), (-1, 0), (0, 1), (0, -1)]
+    pushed = solve(TransferProblem(**PLAIN, actuator=Nozzles(ways, 5.0)), order=4, steps=10)
+    with pytest.raises(ValueError, match="feedback needs an actuator whose controls are a force"):
+        disperse(pushed, (0.01, 0.01), feedback=True)
+
+
 def test_each_error_has_random_numbers_of_its_own():
     answer = solve(TransferProblem(**PLAIN), order=2, steps=6)
 
@@ -191,7 +278,9 @@ def test_bad_input():
         disperse(solve(TransferProblem(**(PLAIN | line)), steps=4), pointing=0.1)
     for name in ("reorientation", "pendulum", "gates"):
         problem = load_problem(name).make()
-        with pytest.raises(ValueError, match=r"disperse (takes|flies)"):
+        with pytest.raises(
+            ValueError, match=r"(disperse and feedback take|flights with errors are of one body)"
+        ):
             disperse(solve(getattr(problem, "alone", None) or problem))
     with pytest.raises(ValueError, match="solution must be a"):
         disperse(answer.path)

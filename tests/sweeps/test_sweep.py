@@ -143,6 +143,23 @@ def test_the_file_has_what_was_swept_as_dimensions_and_failures_as_data(push, he
         assert point.checks_hold and point.failed_check == "" and point.iterations > 0 and point.steps == 8
 
 
+def test_every_answer_is_flown_with_errors(push, here):
+    """As `disperse` flies it; a longer push carries an error of the velocity further."""
+    errors = {"start": (0.01, 0.02), "samples": 200, "seed": 4}
+    data = dmoc.sweep(push, {"duration": [2, 4]}, "out.nc", order=4, steps=8, errors=errors)
+    for i, duration in enumerate((2, 4)):
+        answer = dmoc.solve(load_problem(push).make(duration=duration), order=4, steps=8)
+        (_, away, fast), *_ = [one for one in dmoc.disperse(answer, **errors).miss if one[0] == 0.95]
+        assert (data.miss.values[i], data.miss_speed.values[i]) == pytest.approx((away, fast), rel=1e-9)
+    assert data.miss.values[1] > 1.5 * data.miss.values[0] and (data.broken.values == 0).all()
+    assert data.miss.attrs["units"] == "m" and '"samples": 200' in data.attrs["errors"]
+    assert read_sweep("out.nc").identical(data)
+    with pytest.raises(ValueError, match="no error is called 'wind'; there are start, force"):
+        dmoc.sweep(push, {"duration": [2, 4]}, "out.nc", errors={"wind": 1.0})
+    with pytest.raises(ValueError, match="every point was refused, the first with: force must not be"):
+        dmoc.sweep(push, {"duration": [2, 4]}, "bad.nc", order=4, steps=8, errors={"force": -1.0})
+
+
 def test_a_sample_has_its_points_along_one_dimension(push, here):
     data = dmoc.sweep(push, {"duration": (3, 8), "mass": "1:2"}, "out.nc", sample=5, order=4, steps=6)
     assert dict(data.sizes) == {"sample": 5} and data.mass.dims == ("sample",)
