@@ -27,6 +27,7 @@ LAYERS = [
     ["ipopt"],
     ["nlp"],
     ["diagnosis"],
+    ["rungs"],
     ["solver", "checks"],
     ["chains"],
     ["missions"],
