@@ -332,6 +332,8 @@ def test_propellant_burns_along_the_flight():
     assert not is_unknown(plan.actuator.exhaust_velocity)
     kept = plan_for(found, replace(plan, actuator=BallForce(1.0)))
     assert kept.actuator == BallForce(1.0)
+    fired = plan_for(found, replace(plan, actuator=Engine(7.0, exhaust_velocity=30.0)))
+    assert fired.actuator == Engine(7.0, exhaust_velocity=plan.actuator.exhaust_velocity)
     # One that believes in a constant mass is told that something is wrong.
     wrong = identify(flown, **asked(offset=None), order=6)
     assert abs(wrong.values["mass"] - 20) > 1 and "times as large as the stated noise" in wrong.remarks[0]
