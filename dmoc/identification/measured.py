@@ -166,7 +166,7 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
         leaving = -dynamics.configuration.along(place, momenta[0])
         speed = dynamics.velocity(t, place, leaving, masses[0])[which.tolist()]
         base = ca.SX.sym("p", p.numel())
-        numbers = scene_numbers(setting, base, [setting.mass_at], setting.slopes, theta)
+        numbers = scene_numbers(base, setting.inverted, setting.slopes, theta)
         result = ca.substitute(weight * (speed - y), p, numbers)
         return [nodes, u, *([masses] if burns else []), theta], [begin, length, y, weight, base], result
 
@@ -232,7 +232,7 @@ def add_mass(equations: Equations, fixed: np.ndarray) -> None:
     if "mass" not in setting.columns:
         return
     first = setting.columns["mass"].indices[:, :1]
-    asked = [j for j, one in enumerate(setting.wanted) if one.inverse]
+    asked = [j for j, one in enumerate(setting.wanted) if one.kind == "mass"]
     if not asked:
         fixed[first.ravel()] = True
         return

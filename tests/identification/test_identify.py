@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm, t
 
 from dmoc import (
     BallForce,
@@ -133,6 +134,18 @@ def test_noise_is_found_where_it_is_not_given():
     assert found.noise == pytest.approx(2e-3, rel=0.12)
     given = identify(flight(noise=2e-3, samples=200), **asked(noise=found.noise))
     assert found.sigma["mass"] == pytest.approx(given.sigma["mass"], rel=1e-3)
+
+
+def test_degrees_of_freedom_and_students_distribution():
+    """Two positions a sample less the start and the numbers; where noise is found intervals are Student's."""
+    seen = flight(samples=12, noise=1e-3)
+    known = identify(seen, **asked(offset=None))
+    assert known.fit.degrees == 2 * 12 - 4 - 2
+    found = identify(seen, **asked(offset=None, noise=None))
+    low, high = found.interval(0.9)[DRAG]
+    assert (high - low) / (2 * found.sigma[DRAG]) == pytest.approx(t.ppf(0.95, 18), rel=1e-9)
+    low, high = known.interval(0.9)[DRAG]
+    assert (high - low) / (2 * known.sigma[DRAG]) == pytest.approx(norm.ppf(0.95), rel=1e-9)
 
 
 def test_a_right_scene_fits_and_a_wrong_one_is_told():
@@ -304,8 +317,9 @@ def test_directions_of_single_thrusters():
     ways_found = np.array(found.problem.actuator.directions)
     assert np.linalg.norm(ways_found, axis=1) == pytest.approx(1.0)
     assert ways_found == pytest.approx(np.array([way / np.linalg.norm(way) for way in real]), abs=1e-5)
-    every = identify(flown, **known, tilt=Unknown((0, 0), sigma=0.1), noise=1e-3, attitude_noise=1e-3)
+    every = identify(flown, **known, tilt=Unknown((0.03, -0.02), sigma=0.1), noise=1e-3, attitude_noise=1e-3)
     assert len(every.names) == 8 and every.success
+    assert list(every.values.values())[:4] == pytest.approx([0.06, -0.04, 0, 0], abs=1e-3)
     with pytest.raises(ValueError, match="tilt must be two numbers, or two for each of 4"):
         identify(flown, **known, tilt=[Unknown((0, 0))], noise=1e-3, attitude_noise=1e-3)
     with pytest.raises(ValueError, match="tilt needs Thrusters"):
@@ -327,6 +341,11 @@ def test_propellant_burns_along_the_flight():
     assert [found.values[name] for name in ("mass", DRAG, "exhaust_velocity")] == pytest.approx(truth, rel=1e-5)
     burnt = 0.5 * np.cumsum(np.linalg.norm(flown.forces[:-1], axis=1)) / 50.0
     assert burnt[-1] > 3 and found.mass == pytest.approx(20 - np.append(0, burnt), rel=1e-5)
+    # What is thought to weigh hardly more than what burns is found all the same.
+    light = identify(flown, **asked(offset=None, actuator=thought, mass=Unknown(7.0)), order=6)
+    assert light.values == pytest.approx(found.values, rel=1e-6)
+    with pytest.raises(ValueError, match="a mass of 4 kg burns away: the commands burn"):
+        identify(flown, **asked(offset=None, actuator=thought, mass=Unknown(4.0)), order=6)
     plan = plan_for(found, goal=State((0, 0), (0, 0)), duration=60.0)
     assert plan.mass == found.mass[-1] and plan.actuator.exhaust_velocity == pytest.approx(50.0, rel=1e-5)
     assert not is_unknown(plan.actuator.exhaust_velocity)
@@ -357,6 +376,12 @@ def test_a_turned_engine_and_what_it_cannot_burn():
         **asked(offset=None, mass=20.0, turn=Unknown(0.0)) | {"actuator": Engine(10, exhaust_velocity=50.0)},
     )
     assert turn.values["turn"] == pytest.approx(0.05, abs=1e-6)
+    # It burns as much as ever.
+    commands = pushes(81, 2, 5.0, every=5, seed=1)
+    cos, sin = np.cos(0.05), np.sin(0.05)
+    known = {"mass": 20.0, "effects": [LinearDrag(0.7)], "actuator": Engine(10, exhaust_velocity=50.0)}
+    straight = fly(0.5 * np.arange(81), commands @ [[cos, sin], [-sin, cos]], State((0, 0), (0.1, 0)), **known)
+    assert burning(turn=0.05).positions == pytest.approx(straight.positions, abs=1e-10)
     with pytest.raises(ValueError, match="all propellant burns before the end"):
         burning(mass=3.0)
 
