@@ -97,8 +97,8 @@ class Equations:
     rows, residuals : list of Piece
     labels : list of (str, array)
         Of each kind of residual its name and where it stands, shape (entries, count).
-    free : bool array
-        The unknowns that are not known.
+    missing : int
+        How many residuals stand for what was not measured.
     """
 
     setting: Setting
@@ -106,6 +106,7 @@ class Equations:
     residuals: list[Piece] = field(default_factory=list)
     labels: list[tuple[str, np.ndarray]] = field(default_factory=list)
     row_count: int = 0
+    missing: int = 0
     row_scales: np.ndarray = field(default_factory=lambda: np.empty(0))
     row_nodes: np.ndarray = field(default_factory=lambda: np.empty(0))
 
@@ -125,8 +126,11 @@ class Equations:
         self.row_scales = np.append(self.row_scales, np.full(targets.size, scale))
         self.row_nodes = np.append(self.row_nodes, np.repeat(nodes, results))
 
-    def add_residuals(self, name: str, part: tuple, columns: np.ndarray, numbers: np.ndarray) -> None:
-        """Residuals over their standard deviations."""
+    def add_residuals(
+        self, name: str, part: tuple, columns: np.ndarray, numbers: np.ndarray, missing: int = 0
+    ) -> None:
+        """Residuals over their standard deviations, of which so many are 0 since an axis was not measured."""
+        self.missing += missing
         results = part[0][0].size1_out(0)
         targets = self.count + np.arange(results * columns.shape[1]).reshape(-1, results).T
         self.residuals.append(Piece(part[0], part[1], columns, targets, numbers))

@@ -186,7 +186,7 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
             system = _system(equations, pattern, weight, x)
     system = known
     residuals = equations.values_at(x)[1]
-    degrees = equations.count + equations.row_count - len(free) - len(setting.wanted)
+    degrees = equations.count - equations.missing + equations.row_count - len(free) - len(setting.wanted)
     return Fit(
         x,
         residuals,

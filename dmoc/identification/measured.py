@@ -89,7 +89,8 @@ def add_positions(equations: Equations, sigma: float, offset: Sequence[Any], del
         matrices = turning[there].transpose(2, 1, 0).reshape(axes * axes, -1)
     begun, lengths = flight.times[there] - flight.times[steps], np.diff(flight.times)[steps]
     numbers = np.vstack([np.nan_to_num(y).T, (known / sigma).T, begun[None], lengths[None], matrices])
-    equations.add_residuals("position", made(key, columns.shape[1], write), columns, numbers)
+    part = made(key, columns.shape[1], write)
+    equations.add_residuals("position", part, columns, numbers, int((~known).sum()))
 
 
 def _lagrange(points: np.ndarray, at: Any) -> list[Any]:
@@ -191,6 +192,7 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
         made(key, len(there), write),
         equations.with_numbers(np.vstack([*at, force[:, there], *burning])),
         numbers,
+        int((~np.isfinite(measured[there])).sum()),
     )
 
 

@@ -180,7 +180,7 @@ def first_path(flight: Flight, problem: TransferProblem, order: int) -> Discrete
     if (least := float(masses.min())) <= 0:
         raise ValueError(
             f"a mass of {problem.mass:g} kg burns away: the commands burn {problem.mass - least:.3g} kg at an "
-            f"exhaust velocity of {problem.actuator.exhaust_velocity:g} m/s; begin with a larger mass or velocity"
+            f"exhaust velocity of {problem.actuator.exhaust_velocity:g} m/s; begin with more of either"
         )
     return replace(path, mass=masses)
 

@@ -136,6 +136,19 @@ def test_noise_is_found_where_it_is_not_given():
     assert found.sigma["mass"] == pytest.approx(given.sigma["mass"], rel=1e-3)
 
 
+def test_a_sample_that_lost_one_axis_tells_of_the_other():
+    seen = flight(samples=30, noise=1e-3, velocity_noise=1e-3)
+    half, gone = seen.positions.copy(), seen.positions.copy()
+    half[::3, 0], gone[::3] = np.nan, np.nan
+    one, none = (identify(replace(seen, positions=each), **asked(offset=None)) for each in (half, gone))
+    assert one.fit.degrees == none.fit.degrees + 10 and one.sigma["mass"] < none.sigma["mass"]
+    slow = seen.velocities.copy()
+    slow[::3, 0] = np.nan
+    seen = replace(seen, velocities=slow)
+    # Velocities are those at the begin of each of 29 steps, ten of which have one axis alone.
+    assert identify(seen, **asked(offset=None, velocity_noise=1e-3)).fit.degrees == 60 + 2 * 29 - 10 - 4 - 2
+
+
 def test_degrees_of_freedom_and_students_distribution():
     """Two positions a sample less the start and the numbers; where noise is found intervals are Student's."""
     seen = flight(samples=12, noise=1e-3)
@@ -255,6 +268,8 @@ def test_rates_alone_tell_the_inertia():
     without, found = identify(seen, **ask), identify(seen, **ask, rate_noise=1e-4)
     assert found.sigma["inertia.x"] < 0.3 * without.sigma["inertia.x"] and found.fitting > 1e-3
     assert abs(found.values["inertia.x"] - 0.15) < 4 * found.sigma["inertia.x"]
+    # What is left of attitudes is of the size of their errors.
+    assert np.sqrt(np.mean(found.residuals["attitude"] ** 2)) == pytest.approx(1.0, abs=0.15)
 
 
 def test_thrusters_and_the_centre_of_mass():
