@@ -18,9 +18,9 @@ from dmoc.ipopt.run import STATUSES, Answer
 from dmoc.missions.solution import Kick, MissionSolution
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, part_solution
+from dmoc.rungs.rung import cut_short
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.mission import Mission
-from dmoc.solver.rung import cut_short
 
 
 def answered(

@@ -21,11 +21,11 @@ from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Error, Level
+from dmoc.rungs.rung import rounded
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
 from dmoc.solver.meshes import WIDEST_ROUNDING
-from dmoc.solver.rung import rounded
 from dmoc.solver.solve import check_numerics
 
 # An attempt from a guess ends after this many iterations.

@@ -267,6 +267,9 @@ def _matrix(
     begins = np.searchsorted(column, np.arange(columns + 1))
     pattern = ca.Sparsity(rows, columns, begins.tolist(), row.tolist())
     picked = _picked(pieces, order, starts, np.diff(starts, append=len(keys)))
+    if picked.is_zero():
+        # CasADi drops such entries from the pattern, and they would have a number without a place.
+        return ca.MX(rows, columns)
     return ca.MX(pattern, picked * number(row_scale[row] * column_scale[column]))
 
 

@@ -10,10 +10,10 @@ from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_betwe
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
+from dmoc.rungs.rung import HELD, Rung, let_go, rounded
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import WIDER, Ladder
 from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
-from dmoc.solver.rung import HELD, Rung, let_go, rounded
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest
 # thrust, and the path of least effort no more than this part of that thrust [-]: where it takes more, least

@@ -23,9 +23,10 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
+from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, rounded
+from dmoc.rungs.tube import around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.meshes import coarse_to_fine, rounding_stages
-from dmoc.solver.rung import Rung, answered, cut_short, held_answer, in_tube, out_of_tube, rounded
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
@@ -61,15 +62,10 @@ class Ladder:
         # Whether a problem that a message names has an answer, if somebody can say.
         self.holds: Callable[[TransferProblem], bool] | None = None
         self.patient = True  # a finer mesh is tried where a coarse one has no path
-        self._rungs: list[Rung] = []
+        self.rungs: list[Rung] = []  # all attempts so far
         self._levels: list[Level] = []
         # Takes attempts that were made elsewhere.
         self.tell = self._levels.append
-
-    @property
-    def rungs(self) -> tuple[Rung, ...]:
-        """All attempts so far, in their order."""
-        return tuple(self._rungs)
 
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
         """The answer on the mesh of a first guess, by way of coarser meshes unless it has multipliers.
@@ -194,7 +190,7 @@ class Ladder:
         Where equally good paths differ in their duration Ipopt wanders from one to the other: what fails is
         tried again with the duration `pinned` to that of the coarser mesh, and with a wider rounding of |F| on
         the way. Pinned from the outset, the free duration comes last. `lean` is how strongly an answer is held
-        near the guess.
+        near the guess. Around an attractor a path that leads nowhere walks in tubes first.
         """
         rounding = self.problem.actuator.smoothing
         by_way: list[float | None] = [None] if rounding is None else [WIDER * rounding, None]
@@ -202,11 +198,14 @@ class Ladder:
         ways: list[tuple[bool, list[float | None]]] = [(True, [None]), (True, by_way)]
         if not self.problem.free_duration:
             ways = [(False, by_way)]
+        walks = not (lean or pinned) and around(self.problem, guess) is not None
         for pin, widths in ways + free if pinned else free + ways:
             start = guess
             for width in widths:
-                most = MOST_TRYING if pin or width else MOST_REFINING
+                most = MOST_TRYING if pin or width or walks else MOST_REFINING
                 rung = self.try_on(start, width, most, pin, lean)
+                if walks and not (pin or width):
+                    rung = led(rung, self.ask, self.problem, start, self.try_on)
                 start = rung.path if rung.solved else start
             if rung.stopped or rung.solved:
                 break
@@ -228,10 +227,13 @@ class Ladder:
                 return held
             guess = replace(guess, multipliers={})
         # In the unknowns of a chart Ipopt does not leave the guess for other revolutions.
-        near = None if is_curved(problem, guess) else in_tube(problem, guess)
+        if is_curved(problem, guess):
+            return self._attempt(guess, problem, limits)
+        near = in_tube(problem, guess)
         if near is not None and (tubed := self._attempt(guess, near, limits)).solved:
             guess = out_of_tube(tubed.path)
-        return self._attempt(guess, problem, limits)
+        here = partial(self._attempt, problem=problem, limits=limits)
+        return led(here(guess), self.ask, problem, guess, here)
 
     def _attempt(
         self,
@@ -242,8 +244,7 @@ class Ladder:
         pinned: bool = False,
         lean: float = 0.0,
     ) -> Rung:
-        answers = [one for one in self._rungs if not one.level.question]
-        last = answers[-1] if answers else None
+        last = next((one for one in reversed(self.rungs) if not one.level.question), None)
         if last is not None and not question and self.interrupt.seen:
             return replace(last, answer=replace(last.answer, status="stopped"))
         begun = time.perf_counter()
@@ -266,9 +267,9 @@ class Ladder:
         level = replace(nlp.level(answer, built), question=question)
         asked = problem if question else answered(self.problem, problem)
         pull = nlp.pull(nlp.unpack(answer.x, problem), guess, lean) if lean else 0.0
-        self._rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull))
+        self.rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull))
         self._levels.append(level)
-        return self._rungs[-1]
+        return self.rungs[-1]
 
     def solution(self, rung: Rung, errors: dict[int, float] | None = None, **found: Any) -> Solution:
         """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung.
@@ -294,6 +295,6 @@ class Ladder:
 
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""
-        answers = [one for one in self._rungs if one.solved and not one.level.question]
+        answers = [one for one in self.rungs if one.solved and not one.level.question]
         best = answers[-1] if answers else replace(rung, answer=replace(rung.answer, status="failed"))
         return cut_short(self.solution(best, errors, **found), self.interrupt.seconds, bool(answers))

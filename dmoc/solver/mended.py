@@ -17,9 +17,9 @@ from dmoc.motion.reference import MISSED, goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.between import Cut, cuts
 from dmoc.results.flown_cost import unpriced
+from dmoc.rungs.rung import Rung
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.meshes import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
-from dmoc.solver.rung import Rung
 
 # At most this many ways past the zones are tried, the shortest first: two sides of four zones.
 MOST_WAYS = 8

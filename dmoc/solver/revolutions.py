@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from dmoc.motion.path import DiscretePath
 from dmoc.nlp.units import cost_along
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
+from dmoc.rungs.rung import Rung
+from dmoc.rungs.tube import led
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.meshes import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
-from dmoc.solver.rung import Rung
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.
 SPACING = 0.5
@@ -38,6 +40,8 @@ ALIKE = 1e-3
 # The least effort of a duration is found on at least this many steps of order 6, and on at most five times as
 # many.
 SOUNDING_STEPS = 20
+# A sounding ends after this many iterations, and goes on in tubes: nearly all that get there take 5 to 40.
+MOST_SOUNDING = 60
 # The duration of the best answer is freed if that may save more than this part of the objective, to first order
 # [-].
 NOTHING_TO_GAIN = 1e-9
@@ -93,7 +97,7 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
         best = _shortest_alike(ladder, best, [one for one in soundings if one.excess == 0], hold)
     if best is None or not best.pinned or best.gain < NOTHING_TO_GAIN:
         return best
-    freed = ladder.try_on(best.path)
+    freed = led(ladder.try_on(best.path), ladder.ask, ladder.problem, best.path, ladder.try_on)
     start = best.path
     for lean in () if freed.solved or freed.stopped else HELD:
         # Where the duration hardly matters Ipopt wanders off: held near the path it stays.
@@ -180,7 +184,8 @@ def _sounding(ladder: Ladder, duration: float) -> Sounding | None:
     first = starting_guess(free, uniform_mesh(SOUNDING_STEPS), ORDER_OF_MANY_TURNS, False)
     steps = int(np.clip(least_steps(free, first), SOUNDING_STEPS, 5 * SOUNDING_STEPS))
     guess = starting_guess(free, uniform_mesh(steps), ORDER_OF_MANY_TURNS, False)
-    rung = ladder.ask(free, guess, f"least effort in {lasting(duration, 6)}")
+    ask = partial(ladder.ask, free, question=f"least effort in {lasting(duration, 6)}", most=MOST_SOUNDING)
+    rung = led(ask(guess), ladder.ask, free, guess, ask)
     return promise(ladder.problem, rung) if rung.solved else None
 
 

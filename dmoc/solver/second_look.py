@@ -18,12 +18,12 @@ from dmoc.motion.path import DiscretePath
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
+from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import NEAR, goal_missed
 from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
 from dmoc.solver.revolutions import Sounding, promise, solved_from
-from dmoc.solver.rung import Rung
 
 # In a fixed time another number of revolutions may be better if a path takes more than this many times the
 # least effort of a change of its orbit without a phase [-]: of 60 random transfers the ten that cost more than

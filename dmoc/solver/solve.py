@@ -12,6 +12,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
 from dmoc.results.solution import Solution
+from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
@@ -19,7 +20,6 @@ from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zon
 from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
-from dmoc.solver.rung import Rung
 from dmoc.solver.second_look import cheaper_revolutions
 from dmoc.solver.starts import compared
 from dmoc.solver.tolerance import climb_to_tolerance

@@ -23,12 +23,12 @@ from dmoc.results.facts import Error, off_optimum
 from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, has_linear_controls, is_singular, switches_in_words
+from dmoc.rungs.rung import Rung, at_rest
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
 from dmoc.solver.meshes import TRIAL_ORDER, best_order, order_of_smooth, trial_path, with_as_many_nodes
-from dmoc.solver.rung import Rung, at_rest
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.

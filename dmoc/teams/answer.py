@@ -10,9 +10,9 @@ from dmoc.ipopt.run import STATUSES
 from dmoc.missions.answer import costs_of, worst_rows
 from dmoc.results.facts import Error, Provenance
 from dmoc.results.solution import NOT_MET, part_solution
+from dmoc.rungs.rung import cut_short
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.team import Team
-from dmoc.solver.rung import cut_short
 from dmoc.teams.cuts import team_cuts
 from dmoc.teams.path import TeamPath
 from dmoc.teams.solution import TeamSolution

@@ -12,9 +12,9 @@ from dmoc.checks.verification import verify
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.winding import Winding
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.rungs.tube import in_tube
 from dmoc.scene.problem_file import find, load_problem
 from dmoc.solver.meshes import coarse_to_fine, first_path
-from dmoc.solver.rung import in_tube
 from dmoc.solver.starts import local_optima
 
 GEO = runpy.run_path(str(find("geo_raise")))

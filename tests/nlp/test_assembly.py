@@ -13,6 +13,7 @@ from dmoc import (
     ClohessyWiltshire,
     Constraint,
     Engine,
+    FinalRadius,
     FreeForce,
     Fuel,
     KeepIn,
@@ -32,7 +33,9 @@ from dmoc import (
     TransferProblem,
     UniformGravity,
     rotation,
+    solve,
     transcribe,
+    verify,
 )
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
@@ -385,3 +388,19 @@ def test_solving_again_with_new_numbers_equals_a_fresh_solve(what, hold):
     # nothing in this scene looks at the clock: another start time is the same problem
     moved = abs(objective(nlp, old) / fresh - 1)
     assert moved < 1e-9 if what == "start time" else moved > 1e-4
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_a_curvature_of_nothing_has_no_place_in_the_hessian(hold):
+    """In one dimension the distance at the goal has none: its number had no place, and the solve crashed."""
+    start, goal = State((1.1,), (-0.3,)), State((None,), (-0.5,))
+    problem = TransferProblem(
+        1.0,
+        start,
+        goal,
+        2.0,
+        effects=[UniformGravity((-0.3,))],
+        actuator=BoxForce(1.0),
+        objective=FinalRadius(),
+    )
+    assert verify(solve(problem, hold=hold).raise_for_status()).ok

@@ -224,7 +224,7 @@ def test_with_little_thrust_to_spare_least_fuel_is_sought_as_ever():
     hurried = replace(CIRCLES, actuator=Engine(0.03, exhaust_velocity=3.3))
     ladder = Ladder(hurried)
     assert flat_optimum(ladder, trial_path(hurried, 4, None, False)) is None
-    assert ladder.rungs == ()
+    assert not ladder.rungs
     assert flat_optimum(Ladder(TURNING), trial_path(TURNING, 4, None, False)) is None
 
 

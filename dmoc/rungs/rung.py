@@ -1,4 +1,4 @@
-"""One attempt on one mesh, as a value, and the problems that lead to its own: held, rounded or in a tube."""
+"""One attempt on one mesh, as a value, and the problems that lead to its own: held or rounded."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
-from dmoc.guess.coast import MANY_TURNS
-from dmoc.guess.starting import angle_around
 from dmoc.ipopt.run import Answer
-from dmoc.motion.path import DURATION, POSITION_BOUNDS, DiscretePath
+from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
-from dmoc.parts.constraint import Constraint
 from dmoc.results.facts import Level, off_optimum
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
@@ -37,9 +34,6 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
-# A node may leave its place in the guess by this part of its distance from the attractor [-], along each axis:
-# half of the width of the tube.
-WIDTH = 0.4
 
 
 @dataclass(frozen=True)
@@ -184,44 +178,3 @@ def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Sol
     where = f"order {solution.order}, {solution.steps} steps"
     told = f"{over}; this is the answer on the last mesh that was solved ({where})"
     return replace(solution, success=False, status=OUT_OF_TIME, message=told)
-
-
-@dataclass(frozen=True)
-class _Tube(Constraint):
-    """Each node stays in a box around its place on a path, of shape (nodes, dimension) [m]."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-
-    def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
-        return self.lower, self.upper
-
-    def excess(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.zeros(len(q))
-
-    def words(self) -> str:
-        return "stays near a path"
-
-
-def in_tube(problem: TransferProblem, guess: DiscretePath) -> TransferProblem | None:
-    """The problem with a tube around a guess, where that helps: limited forces, many revolutions.
-
-    From a guess alone Ipopt's first steps go far; over many revolutions that leads to places from which it
-    takes a thousand iterations to come back, or to another optimum. Of 16 guesses and meshes of `dionysus`
-    5 converged within 300 iterations without the tube, all 12 that were tried with it in 80.
-    """
-    attractor = problem.attraction.lone
-    bare = problem.inertia is None and not problem.constraints
-    if attractor is None or not bare or problem.actuator.force_limit() is None:
-        return None
-    if angle_around(problem, guess) < 2 * np.pi * MANY_TURNS:
-        return None
-    offset = guess.position - attractor.place(problem.dimension)
-    width = WIDTH * np.linalg.norm(offset, axis=1, keepdims=True)
-    return replace(problem, constraints=(_Tube(guess.position - width, guess.position + width),))
-
-
-def out_of_tube(path: DiscretePath) -> DiscretePath:
-    """An answer within a tube without the multipliers of the tube, which the problem itself does not have."""
-    multipliers = {key: value for key, value in path.multipliers.items() if key != POSITION_BOUNDS}
-    return replace(path, multipliers=multipliers)
