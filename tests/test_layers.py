@@ -37,6 +37,7 @@ LAYERS = [
     ["planners"],
     ["sensitivity", "identification"],
     ["studies", "sweeps", "exports", "conversions", "answers"],
+    ["surroundings"],
     ["plots", "reports"],
     ["charts", "films"],
     ["pages"],

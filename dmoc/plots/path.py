@@ -10,9 +10,10 @@ import numpy as np
 
 from dmoc.parts.outline import Ball, Box
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, readable, within_steps
-from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
+from dmoc.plots.surroundings import draw_scene
 from dmoc.plots.turning import draw_triads, paths_of_points
 from dmoc.results.solution import Solution
+from dmoc.surroundings.view import Corners, outlines, view_of
 
 # Step ends are drawn as dots if there are at most this many steps: more would hide the line.
 MOST_DOTS = 40
@@ -30,7 +31,7 @@ HIGHER = 25.0
 # Numbers from this on are long [-]: their signs and digits take the room of two short ones.
 LONG_NUMBER = 1000.0
 # A legend below a panel has room for so many letters, of which each mark with its gaps takes so many.
-LETTERS, MARK = 78, 7
+LETTERS, MARK = 74, 7
 # What the line on the floor of the box is.
 PROJECTION = "projection"
 # Numbers with powers of ten between these two are written without one [-], as in all other panels.
