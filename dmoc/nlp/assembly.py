@@ -220,7 +220,9 @@ def _evaluated(
     """Kind and value of every result of a block that is not zero by its structure, one column an evaluation."""
     kernel, count = block.kernel, block.count
     p = [block.first + place for place in kernel.used[1]]
-    given = [_columns(unknowns, block.columns), values, ca.repmat(parameters[p], 1, count)]
+    # Of an empty matrix repeated CasADi writes C code that newer compilers refuse.
+    same = ca.repmat(parameters[p], 1, count) if p else ca.MX(0, count)
+    given = [_columns(unknowns, block.columns), values, same]
     dual = [_columns(multipliers, block.targets), ca.repmat(weight, 1, count)]
     for kind, function in (kernel.compiled if compiled else kernel.functions).items():
         if function.numel_out(0) and (kernel.costly or kind not in ("cost", "gradient")):
