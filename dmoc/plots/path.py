@@ -266,14 +266,17 @@ def legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
         return
     columns = _columns(labels)
     below = -0.06 if axes.name == "3d" else -0.11
+    if axes.name == "3d" and len(labels) > 2 * columns:
+        # a third row would reach into the line at the foot; in space there is room above
+        below = 0.0
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
 
 
 def _columns(labels: list[str]) -> int:
     """In how many columns a legend is as wide as its panel at most."""
     for columns in (4, 3):
-        rows = -(-len(labels) // columns)
-        widths = [max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows)]
+        # matplotlib fills columns so: of 9 entries the first of four has 3, the others 2 each
+        widths = [max(map(len, part)) for part in np.array_split(labels, columns) if len(part)]
         # Three rows would reach into the line below the panels, where two do.
         if sum(widths) + MARK * len(widths) <= LETTERS and not (columns == 4 and 4 < len(labels) <= 6):
             return columns
