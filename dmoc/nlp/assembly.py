@@ -101,11 +101,8 @@ class Assembly:
         """The last entries of p for other units or another mesh; none where these are constants."""
         if not self.parametric:
             return np.empty(0)
-        sides = scaling.rows, scaling.columns
-        products = [
-            side[row] * scaling.columns[column]
-            for side, (row, column) in zip(sides, self._entries, strict=True)
-        ]
+        pairs = zip((scaling.rows, scaling.columns), self._entries, strict=True)
+        products = [side[row] * scaling.columns[column] for side, (row, column) in pairs]
         values = [given.ravel(order="F") for given in scaling.values]
         return np.concatenate([scaling.columns, scaling.rows, [scaling.cost], *values, *products])
 
