@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.legs.legs import Leg
+from dmoc.legs.legs import Joint, Leg
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
@@ -82,13 +82,14 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
         lower[place] = upper[place] = mission.mass / scale
     place = columns[LEG_START].start
     lower[place], upper[place] = -np.inf, np.inf
+    before, behind = mission.joints[index : index + 2]
     if index == 0:
         lower[place], upper[place] = (end / program.units.time for end in mission.start_bounds)
     else:
-        _leave(program, legs[index - 1].program.problem, 0, sides)
+        _leave(program, legs[index - 1].program.problem, (0, "start"), before, sides)
     if index + 1 < len(legs):
-        _leave(program, legs[index + 1].program.problem, -1, sides)
-    for place, joint in ((0, mission.joints[index]), (-1, mission.joints[index + 1])):
+        _leave(program, legs[index + 1].program.problem, (-1, "goal"), behind, sides)
+    for place, joint in ((0, before), (-1, behind)):
         for event in joint.events:
             if event.continued and event.left_behind == (place == -1):
                 _leave_controls(program, event.continued, place, sides)
@@ -103,12 +104,19 @@ def _leave_controls(program: Program, which: tuple[int, ...], place: int, sides:
             sides[2][group.indices[:, place]], sides[3][group.indices[:, place]] = -np.inf, np.inf
 
 
-def _leave(program: Program, beside: TransferProblem, place: int, sides: list[np.ndarray]) -> None:
+def _leave(
+    program: Program,
+    beside: TransferProblem,
+    at: tuple[int, str],
+    joint: Joint,
+    sides: list[np.ndarray],
+) -> None:
     """Leave limits at the first or last node of a leg to the leg beside it.
 
     A second time, rows and bounds of the same place would depend on each other. Of equal constraints the
     earlier leg keeps its limits; one that the leg beside it follows is left to that one.
     """
+    place, end = at
     mine, other = program.problem.constraints, beside.constraints
     if len(mine) != len(other):
         return
@@ -116,18 +124,19 @@ def _leave(program: Program, beside: TransferProblem, place: int, sides: list[np
         (place == 0 and one == two) or (getattr(two, "follows", False) and not getattr(one, "follows", False))
         for one, two in zip(mine, other, strict=True)
     ]
+    # The velocity goes on where no event changes it.
+    smooth = all(event.continued for event in joint.events)
     for group in program.rows.groups:
-        if (
-            group.kind == "node"
-            and group.owner
-            and group.owner.field == "constraints"
-            and same[group.owner.entry]
-        ):
+        if not (group.owner and group.owner.field == "constraints" and same[group.owner.entry]):
+            continue
+        if group.kind == "end" and group.owner.end == end and smooth:
+            sides[2][group.start : group.stop], sides[3][group.start : group.stop] = -np.inf, np.inf
+        if group.kind == "node":
             sides[2][group.indices[:, place]], sides[3][group.indices[:, place]] = -np.inf, np.inf
     boxes = [np.isfinite(one.bounds(program.problem.dimension)).any() for one in mine]
     if any(boxes) and all(left for left, box in zip(same, boxes, strict=True) if box):
-        at = program.columns["position"].indices[:, place]
-        sides[0][at], sides[1][at] = -np.inf, np.inf
+        places = program.columns["position"].indices[:, place]
+        sides[0][places], sides[1][places] = -np.inf, np.inf
 
 
 def polynomial_rows(placed: Placed, leg: Leg) -> tuple[list[Row], np.ndarray, np.ndarray]:

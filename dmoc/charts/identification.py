@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Residuals are drawn with the lines between which 95 % of a normal distribution lie.
 WIDE = 1.96
+# Numbers on cells, which are light on a dark page, too.
+ON_CELLS = "#111111"
 
 
 def estimate_figure(found: Estimate) -> Figure:
@@ -25,7 +27,7 @@ def estimate_figure(found: Estimate) -> Figure:
     with matplotlib.rc_context(SETTINGS):
         page = Figure(figsize=(15, 8.4), layout="constrained")
         (way, left), (spans, alike) = page.subplots(2, 2)
-        page.suptitle(f"{found.flight.name}: what {len(found.flight.times)} samples say")
+        page.suptitle(f"{found.flight.name.replace('_', ' ')}: what {len(found.flight.times)} samples say")
         _draw_way(way, found)
         _draw_residuals(left, found)
         _draw_intervals(spans, found)
@@ -63,7 +65,8 @@ def _draw_residuals(axes: Any, found: Estimate) -> None:
     for side in (-WIDE, WIDE):
         axes.axhline(side, color=PALE, linestyle=(0, (7, 4)), linewidth=1.4)
     axes.set(title=f"Residuals of the {kind}, over their noise", xlabel="sample", ylabel="[-]")
-    axes.legend(ncols=3)
+    # Above the panel: the dots may be anywhere in it.
+    axes.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
 
 
 def _draw_intervals(axes: Any, found: Estimate) -> None:
@@ -96,7 +99,7 @@ def _draw_correlations(axes: Any, found: Estimate) -> None:
     axes.imshow(values, cmap=ramp, vmin=-1, vmax=1, aspect="auto")
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
-            axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=10)
+            axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=10, color=ON_CELLS)
     names = _names(found)
     axes.set_xticks(range(len(names)), names, rotation=20, ha="right")
     axes.set_yticks(range(len(names)), names)

@@ -26,9 +26,9 @@ COLOURS = (PATH, "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", DARK)
 MARGIN = 0.05
 
 
-def save_motion(trajectory: Trajectory, problem: Any, path: str | os.PathLike) -> None:
+def save_motion(trajectory: Trajectory, problem: Any, path: str | os.PathLike, dark: bool = False) -> None:
     """Draw a simulation into a .png, .pdf or .svg, whole or not at all."""
-    save_page(motion_figure(trajectory, problem), path)
+    save_page(motion_figure(trajectory, problem), path, dark=dark)
 
 
 def motion_figure(trajectory: Trajectory, problem: Any) -> Figure:

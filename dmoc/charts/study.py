@@ -11,7 +11,7 @@ import numpy as np
 
 from dmoc.basics.files import as_path, whole_file
 from dmoc.plots.page import SUFFIXES
-from dmoc.plots.sheet import darken
+from dmoc.plots.sheet import darkened
 from dmoc.plots.style import DARK, SETTINGS, plain_numbers
 from dmoc.studies.accuracy import COLD, COMPILED, Trial
 
@@ -30,7 +30,7 @@ DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (7, 2, 1, 2)), (0, (3, 1.5)), (0, (5, 
 APART = 0.045
 
 
-def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = "") -> None:
+def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = "", dark: bool = False) -> None:
     """Draw error against time into a file, whole or not at all.
 
     Parameters
@@ -41,21 +41,22 @@ def save_study(trials: Sequence[Trial], path: str | os.PathLike, title: str = ""
         Ends in .png, .pdf or .svg, which decides the format.
     title : str
         Title of the figure: the problem that was solved.
+    dark : bool
+        On a dark background.
 
     Raises
     ------
     ValueError
         If the suffix is another one, the folder does not exist, or nothing was solved.
     """
-    save_page(study_figure(trials, title), path)
+    save_page(study_figure(trials, title), path, dark=dark)
 
 
 def save_page(page: Figure, path: str | os.PathLike, dpi: float = 150, dark: bool = False) -> None:
     """Write a figure into a .png, .pdf or .svg file, whole or not at all; ValueError if it cannot be."""
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
-    if dark:
-        darken(page)
+    darkened(page, dark)
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)
 

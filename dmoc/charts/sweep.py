@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 LEVELS = 8
 # Contours bear numbers on maps of at least this many cells each way: on fewer the numbers stand on one another.
 LABELLED = 12
+# Lines on a map are white, on a dark page too, where white itself is turned dark.
+ON_MAP = "#fefefe"
 
 
 def save_sweep(data: Dataset, path: str | os.PathLike, dark: bool = False) -> None:
@@ -144,14 +146,14 @@ def _draw_map(axes: Any, data: Dataset) -> None:
     edges = _edges(x, axes.get_xscale()), _edges(y, axes.get_yscale())
     cells = axes.pcolormesh(*edges, values, norm=_norm(values), cmap="viridis")
     if min(values.shape) > 2 and solved.sum() > 8 and np.ptp(values[solved]) > 0:
-        lines = axes.contour(x, y, values, levels=_levels(values), colors="white", linewidths=0.9)
+        lines = axes.contour(x, y, values, levels=_levels(values), colors=ON_MAP, linewidths=0.9)
         for text in axes.clabel(lines, fontsize=9, fmt="%.3g") if min(values.shape) >= LABELLED else ():
             text.set_path_effects([withStroke(linewidth=1.5, foreground=DARK)])
     _hatch(axes, edges, ~solved, "xxx", PALE, "not solved")
     _hatch(axes, edges, solved & ~held.T, "...", WARNING, "a check fails")
     if solved.any():
         row, column = np.unravel_index(np.nanargmin(sense * np.where(solved, values, np.nan)), values.shape)
-        axes.plot(x[column], y[row], "*", color=FORBIDDEN, markersize=15, markeredgecolor="white", label="best")
+        axes.plot(x[column], y[row], "*", color=FORBIDDEN, markersize=15, markeredgecolor=ON_MAP, label="best")
         axes.figure.colorbar(cells, ax=axes, label=f"{_kind(objective)} [{pretty(unit)}]")
     axes.grid(False)
     over = f", the best over {' and '.join(map(str, others))}" if others else ""

@@ -105,10 +105,10 @@ def new(
 @app.command(epilog="Example: dmoc show free_flyer")
 def show(name: Name, settings: Settings = None) -> None:
     """Say what a problem is: the scene, its parameters, the size of its NLP as solved without options."""
+    from dmoc.meshes.choices import first_path
     from dmoc.nlp.transcription import transcribe_onto
     from dmoc.nlp.units import units_of
     from dmoc.reports import words as report
-    from dmoc.solver.meshes import first_path
 
     file, problem = problem_of(name, settings)
     console = report.console()
@@ -198,6 +198,7 @@ def animate(
     out: Annotated[Path | None, typer.Option(help="Where to; the file's name with .gif if not given.")] = None,
     frames: Annotated[int, typer.Option(help="Number of frames, 2 to 200; 20 are shown a second.")] = 80,
     source: Source = None,
+    dark: pages_command.Dark = False,
 ) -> None:
     """Write a moving picture of a saved solution."""
     import dmoc
@@ -205,7 +206,7 @@ def animate(
 
     target = file.with_suffix(".gif") if out is None else out
     writable(target, moving=True)
-    dmoc.animate(seen(file, source), target, frames)
+    dmoc.animate(seen(file, source), target, frames, dark)
     report.console().print(f"wrote {target}")
 
 

@@ -21,6 +21,7 @@ from dmoc.cli.options import (
     switch,
     writable,
 )
+from dmoc.cli.pages import Dark
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def disperse(
     samples: Annotated[int, typer.Option(help="Number of flights, at least 2.")] = 1000,
     seed: Annotated[int, typer.Option(help="The same seed gives the same flights.")] = 0,
     plot: Annotated[Path | None, typer.Option(help="Draw the flights here (png, pdf or svg).")] = None,
+    dark: Dark = False,
     source: Source = None,
     as_json: Json = False,
 ) -> None:
@@ -75,7 +77,7 @@ def disperse(
         from dmoc.charts.dispersion import dispersion_figure
         from dmoc.charts.study import save_page
 
-        save_page(dispersion_figure(found, solution), plot)
+        save_page(dispersion_figure(found, solution), plot, dark=dark)
     if as_json:
         from dmoc.reports import as_json as report
 
@@ -134,6 +136,7 @@ def identify(
     order: Annotated[int, typer.Option(help="2, 4, 6 or 8, of the equations between samples.")] = 4,
     out: Annotated[Path | None, typer.Option(help="Write values and intervals here, as JSON.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the estimate here (png, pdf or svg).")] = None,
+    dark: Dark = False,
     as_json: Json = False,
 ) -> None:
     """Find numbers of a body, such as its mass and drag, from a measured flight."""
@@ -152,16 +155,16 @@ def identify(
             "rate_noise": rate_noise,
         }
         found = dmoc.identify(seen, **given, **sigmas, noise=noise, force_noise=force_noise, order=order)
-    _show(found, as_json, out, plot)
+    _show(found, as_json, out, plot, dark)
     if not found.success:
         raise typer.Exit(NOT_SOLVED)
 
 
-def _show(found: Estimate, as_json: bool, out: Path | None, plot: Path | None) -> None:
+def _show(found: Estimate, as_json: bool, out: Path | None, plot: Path | None, dark: bool) -> None:
     if out is not None:
         found.save(out)
     if plot is not None:
-        found.plot(plot)
+        found.plot(plot, dark)
     if as_json:
         from dmoc.reports.as_json import as_text
 

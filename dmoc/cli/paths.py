@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from dmoc.cli.options import File, Hold, Json, Name, Order, Settings, Steps, ends_at_once, problem_of, writable
+from dmoc.cli.pages import Dark
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -29,6 +30,7 @@ def simulate(
     plot: Annotated[
         Path | None, typer.Option(help="Draw path, speed and energy here: .png, .pdf or .svg.")
     ] = None,
+    dark: Dark = False,
     as_json: Json = False,
 ) -> None:
     """March the integrator forward from the start, without optimisation."""
@@ -50,16 +52,17 @@ def simulate(
         else:
             trajectory = dmoc.simulate(problem, known, *given)
     if hasattr(problem, "together"):
-        told = [
-            _told(flights[body], one, _of_body(out, body), _of_body(plot, body), known is None, as_json)
-            for body, one in zip(problem.names, problem.members, strict=True)
-        ]
+        told = []
+        for body, one in zip(problem.names, problem.members, strict=True):
+            written = _write(flights[body], one, _of_body(out, body), _of_body(plot, body), dark)
+            told.append(_told(flights[body], one, written, known is None, as_json))
         if as_json:
             from dmoc.reports.as_json import as_text
 
             print(as_text({"problem": problem.name, "bodies": dict(zip(problem.names, told, strict=True))}))
         return
-    found = _told(trajectory, problem, out, plot, known is None, as_json)
+    written = _write(trajectory, problem, out, plot, dark)
+    found = _told(trajectory, problem, written, known is None, as_json)
     if as_json:
         from dmoc.reports.as_json import as_text
 
@@ -71,10 +74,8 @@ def _of_body(path: Path | None, body: str) -> Path | None:
     return None if path is None else path.with_stem(f"{path.stem}_{body.replace(' ', '_')}")
 
 
-def _told(
-    trajectory: Any, problem: Any, out: Path | None, plot: Path | None, coast: bool, as_json: bool
-) -> Any:
-    """Write and tell of one flight; the JSON object if that is asked for."""
+def _write(trajectory: Any, problem: Any, out: Path | None, plot: Path | None, dark: bool) -> list[Path]:
+    """Write table and picture of one flight, where they are asked for; the files."""
     if out is not None:
         from dmoc.conversions.marched import write_marched
 
@@ -82,7 +83,12 @@ def _told(
     if plot is not None:
         from dmoc.charts.motion import save_motion
 
-        save_motion(trajectory, problem, plot)
+        save_motion(trajectory, problem, plot, dark)
+    return [path for path in (out, plot) if path is not None]
+
+
+def _told(trajectory: Any, problem: Any, written: list[Path], coast: bool, as_json: bool) -> Any:
+    """Tell of one flight; the JSON object if that is asked for."""
     if as_json:
         from dmoc.reports import as_json as report_json
 
@@ -91,7 +97,7 @@ def _told(
 
     console = report.console()
     console.print(report.motion(trajectory, problem, coast=coast))
-    for path in filter(None, (out, plot)):
+    for path in written:
         console.print(f"wrote {path}")
     return None
 

@@ -95,6 +95,6 @@ def solve(
     if plot is not None:
         draw(solution, plot, verdict, dark)
     if animate is not None:
-        dmoc.animate(solution, animate)
+        dmoc.animate(solution, animate, dark=dark)
     written = [path for path in (out, plot, animate) if path is not None]
     show_answer(solution, verdict, as_json, quiet, written, with_worth=worth)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dmoc.cli.options import Json, ends_at_once, writable
+from dmoc.cli.pages import Dark
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -33,6 +34,7 @@ def stability(
         int, typer.Option(help="Steps of bodies that turn or hang on rods, at least 10.")
     ] = 2_000,
     plot: Annotated[Path | None, typer.Option(help="Draw all of it here (png, pdf or svg).")] = None,
+    dark: Dark = False,
     as_json: Json = False,
 ) -> None:
     """Measure numerical stability: drift over many revolutions, rounding, the longest stable steps.
@@ -59,7 +61,7 @@ def stability(
         from dmoc.charts.stability import stability_figure
         from dmoc.charts.study import save_page
 
-        save_page(stability_figure(runs, rounding, edges), plot)
+        save_page(stability_figure(runs, rounding, edges), plot, dark=dark)
     if as_json:
         from dmoc.reports.as_json import as_text
 

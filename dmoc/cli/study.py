@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from dmoc.cli.options import Json, Name, Settings, ends_at_once, not_a_team, switch, writable
+from dmoc.cli.pages import Dark
 
 # Everything else is imported where it is used: `dmoc --help` answers at once.
 
@@ -41,6 +42,7 @@ def study(
     ] = None,
     settings: Settings = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time here (png, pdf or svg).")] = None,
+    dark: Dark = False,
     csv: Annotated[Path | None, typer.Option(help="Write a line a solve here.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -48,7 +50,6 @@ def study(
 
     Medians of several runs; whatever else the computer does makes them longer.
     """
-    from dmoc.charts.study import save_study
     from dmoc.reports import study as report_study
     from dmoc.reports import words as report
     from dmoc.studies.accuracy import work_precision
@@ -61,11 +62,11 @@ def study(
     with redirect_stdout(sys.stderr if as_json else sys.stdout), ends_at_once(), live or nullcontext():
         problem = not_a_team(name, settings, "study")
         methods = {} if against is None else load_methods(against)
-        told = live.update if live else None
         measured = _of_mission if hasattr(problem, "plan") else work_precision
+        told = live.update if live else None
         trials = measured(problem, chosen, meshes, repeats, methods, reference, cold, compiled, told)
     if plot is not None:
-        save_study(trials, plot, f"{problem.name.replace('_', ' ')}: what accuracy costs in time")
+        _draw(trials, problem.name.replace("_", " "), plot, dark)
     if csv is not None:
         report_study.write_csv(trials, csv)
     if as_json:
@@ -78,6 +79,12 @@ def study(
     console.print(report_study.study_tables(trials, unit, console.width))
     for path in filter(None, (plot, csv)):
         console.print(f"wrote {path}")
+
+
+def _draw(trials: list, name: str, path: Path, dark: bool) -> None:
+    from dmoc.charts.study import save_study
+
+    save_study(trials, path, f"{name}: what accuracy costs in time", dark)
 
 
 def _of_mission(

@@ -58,6 +58,8 @@ class Cause:
         to blame.
     zones : bool
         Whether zones are in the way, of which each alone would have to give way.
+    turns : bool
+        Whether the actuator can turn the body about every axis.
     coarse : bool
         Whether twice as many steps need so much less that the mesh may be to blame, and not the problem.
     """
@@ -67,6 +69,7 @@ class Cause:
     rows: tuple[str, ...] = ()
     excess: float = np.inf
     zones: bool = False
+    turns: bool = True
     coarse: bool = False
 
     @property
@@ -88,6 +91,8 @@ class Cause:
             parts.append(f"{where}{what} needs {', or '.join(need[0].words for need in self.needs)}")
         if self.rows:
             parts.append(f"these rows cannot be met together: {', '.join(self.rows)}")
+            if not self.turns:
+                parts.append("the actuator makes no torque about some axis")
         return "; ".join(parts)
 
 
@@ -262,7 +267,9 @@ def _rows(transfer: Relaxable) -> Cause:
     owners = [layout.group_at(i).owner for i in worst]
     blamed = any(owner is not None and owner.field == "constraints" for owner in owners)
     names = tuple(layout.name_of(i) for i in worst)
-    return (_zones(transfer) if blamed else None) or Cause(rows=names)
+    return (_zones(transfer) if blamed else None) or Cause(
+        rows=names, turns=transfer.problem.actuator.turns_every_way
+    )
 
 
 def _zones(transfer: Relaxable) -> Cause | None:

@@ -162,7 +162,7 @@ def msis_atmosphere(
     Raises
     ------
     ValueError
-        If pymsis is not installed (`pip install 'dmoc[air]'`), the date is none, or a number has no meaning.
+        If pymsis is not installed (`pip install pymsis`), the date is none, or a number has no meaning.
 
     References
     ----------
@@ -189,7 +189,7 @@ def _asked(date: str, heights: np.ndarray, flux: float, mean: float, field: floa
     try:
         import pymsis
     except ImportError:
-        raise ValueError("the air of a date needs pymsis: pip install 'dmoc[air]'") from None
+        raise ValueError("the air of a date needs pymsis: pip install pymsis") from None
     try:
         when = np.datetime64(date)
     except (TypeError, ValueError):

@@ -54,15 +54,17 @@ def write_code(planner: Planner, functions: Sequence[Exported], folder: Path) ->
 
 
 def write_mission_code(planner: MissionPlanner, functions: Sequence[Exported], folder: Path) -> None:
-    """functions.c, functions.h and mission.h of a mission's steps, rollouts and residual, in a folder."""
+    """functions.c, functions.h and mission.h or team.h of steps, rollouts and residual, in a folder."""
     _generate(functions, folder)
     sizes: dict[str, tuple[int, str]] = {}
     for name, words, scene in zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True):
         about = f"of {in_comment(words)}, order {scene.rule.order}"
         sizes[f"{name.upper()}_STEPS"] = scene.steps, f"steps {about}"
         sizes[f"{name.upper()}_NODES"] = scene.nodes, f"nodes {about}"
-    text = _filled(planner.mission.name, f"{len(planner.names)} legs", functions, sizes)
-    (folder / "mission.h").write_text(text.replace("DMOC_TRANSFER_H", "DMOC_MISSION_H"))
+    about = f"{len(planner.names)} {planner.stretch}s".replace("ys", "ies")
+    text = _filled(planner.mission.name, about, functions, sizes)
+    guard = f"DMOC_{planner.kind.upper()}_H"
+    (folder / f"{planner.kind}.h").write_text(text.replace("DMOC_TRANSFER_H", guard))
 
 
 def _generate(functions: Sequence[Exported], folder: Path) -> None:

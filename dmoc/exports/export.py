@@ -21,6 +21,7 @@ from dmoc.configurations.coordinates import PLACE
 from dmoc.exports.code import write_code, write_mission_code
 from dmoc.exports.manifest import EXPORT_FORMAT, EXPORT_VERSION, about_mission, about_transfer, manifest, plain
 from dmoc.exports.readme import mission_readme, readme
+from dmoc.meshes.choices import DEFAULT_STEPS
 from dmoc.motion.lobatto import scheme
 from dmoc.planners import functions as export_functions
 from dmoc.planners import planner as export_solver
@@ -28,12 +29,13 @@ from dmoc.planners import residual as export_residual
 from dmoc.planners import sensitive
 from dmoc.planners.mission import MissionPlanner
 from dmoc.planners.planner import Planner
+from dmoc.planners.team import TeamPlanner
 from dmoc.planners.terms import Exported
 from dmoc.planners.whole import coded, mission_functions
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+from dmoc.scene.team import Team
 from dmoc.sensitivity.exported import prediction
-from dmoc.solver.meshes import DEFAULT_STEPS
 from dmoc.solver.solve import check_numerics
 
 # The remedy that is told where a folder holds what an export must not take the place of.
@@ -41,7 +43,7 @@ MOVE = "name a new folder, or move what is there"
 
 
 def export(
-    problem: TransferProblem | Mission,
+    problem: TransferProblem | Mission | Team,
     folder: str | os.PathLike,
     order: int | None = None,
     steps: int | None = None,
@@ -77,14 +79,15 @@ def export(
     Of a mission each leg has its `step` and `rollout`, named with the leg behind; `residual`, `cost` and the
     solvers are those of the whole, with the unknowns of all legs, impulses and flybys as arguments by name. It
     stands on the meshes of `guess`, or on those from which a solve begins. Best is a solution: the exported
-    solver has no rounding of impulses that falls step by step, and from a poor guess it may fail.
+    solver has no rounding of impulses that falls step by step, and from a poor guess it may fail. Of a team it
+    is the same with a body in the place of each leg; the distances that bodies keep are fixed.
 
     A `.casadi` file is code: CasADi runs what it holds, and solver plug-ins that it names. Load one only if
     you trust where it comes from. dmoc itself never loads one.
 
     Parameters
     ----------
-    problem : TransferProblem or Mission
+    problem : TransferProblem, Mission or Team
     folder : path
         Made by this call; if it is there, it must be empty or hold an earlier export as it was written and
         nothing else.
@@ -119,16 +122,16 @@ def export(
         If a number has no meaning, the scheme is unstable with these steps, or the folder holds anything else.
     """
     problem = getattr(problem, "alone", None) or problem
-    if hasattr(problem, "together"):
-        raise ValueError("a team of bodies is not exported; export the body that you mean, a TransferProblem")
-    mission = hasattr(problem, "joints")
-    of_kind("problem", problem, Mission if mission else TransferProblem)
+    kind: Any = Mission if hasattr(problem, "joints") else TransferProblem
+    kind = Team if hasattr(problem, "together") else kind
+    of_kind("problem", problem, kind)
     if problem.objective.learns:
         raise ValueError("a plan with Information has no exported functions; export it with another objective")
     hold, c = flag("hold", hold), flag("c", c)
     target = _checked_folder(as_path(folder))
-    made = _of_mission if mission else _of_transfer
-    functions, count, about, words, write = made(problem, (order, steps, hold, guess), options, c)
+    made = {Mission: partial(_of_mission, MissionPlanner), Team: partial(_of_mission, TeamPlanner)}
+    made_of = made.get(kind, _of_transfer)
+    functions, count, about, words, write = made_of(problem, (order, steps, hold, guess), options, c)
     with _whole_folder(target) as work:
         for exported in functions:
             _save(exported.function, work / f"{exported.function.name()}.casadi")
@@ -162,10 +165,12 @@ def _of_transfer(problem: Any, numerics: tuple, options: dict[str, Any] | None, 
     return _Contents(functions_of(planner, options, guess), 3, about_transfer(planner), words, write)
 
 
-def _of_mission(problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool) -> _Contents:
+def _of_mission(
+    kind: type[MissionPlanner], problem: Any, numerics: tuple, options: dict[str, Any] | None, c: bool
+) -> _Contents:
     order, steps, hold, _ = numerics
     check_numerics(order, steps, None, hold, options, None, None)
-    planner = MissionPlanner.of(problem, *numerics)
+    planner = kind.of(problem, *numerics)
     functions, write = mission_functions(planner, options), partial(write_mission_code, planner)
     return _Contents(functions, coded(planner), about_mission(planner), mission_readme(planner, c), write)
 

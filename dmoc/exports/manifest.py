@@ -31,11 +31,11 @@ def about_transfer(planner: Planner) -> dict[str, Any]:
 
 
 def about_mission(planner: MissionPlanner) -> dict[str, Any]:
-    """What the manifest says of a mission beside its functions: a scheme for each leg."""
+    """What the manifest says of a mission or a team beside its functions: a scheme for each leg or body."""
     mission, legs = planner.mission, zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True)
     return {
         "problem": {"name": mission.name, "parameters": mission.parameters},
-        "legs": {
+        {"leg": "legs", "body": "bodies"}[planner.stretch]: {
             name: {
                 "words": words,
                 "scheme": _scheme(scene) | {"mesh": list(scene.mesh) or "equal steps"},

@@ -70,7 +70,7 @@ MISSION = """\
 
 `manifest.json` lists every function with shape, unit and meaning of its arguments, and the SHA-256 of every
 file here. All values are in SI units; matrices have one column a node, a step end or a step. The names of
-arguments that belong to a leg begin with that of the leg: {legs}.
+arguments that belong to a {stretch} begin with that of the {stretch}: {legs}.
 
 A `.casadi` file is code: CasADi runs what it holds. Load one only if you trust where it comes from.
 
@@ -78,33 +78,54 @@ Python, with CasADi alone:
 
     import casadi as ca
     nominal, solver = ca.Function.load("nominal.casadi"), ca.Function.load("solver.casadi")
-    inputs = nominal()                     # the mission's own numbers and its guess, by name
-    inputs["mass"] *= 1.01                 # a little heavier than the mission states
+    inputs = nominal()                     # the {kind}'s own numbers and its guess, by name
+    inputs["{mass}"] *= 1.01{blank}# a little heavier than the {kind} states
     plan = solver(**inputs)
     print(plan["objective"], plan["largest_residual"], plan["violation"], solver.stats()["return_status"])
 
 The solver always returns, whatever its status. A plan can be flown if `largest_residual` [N] and `violation`
 (of rows and bounds, scaled) are small; that it is an optimum only the status says. `residual` gives the same
-for any path: what is left of the rows of each leg and of each joint, 0 where they hold.
+for any path: what is left of the rows of each {stretch} and of {others}, 0 where they hold.
 
-`step_{leg}` is one step of a leg for any step length, `rollout_{leg}` all of its steps, on the mesh that the
-manifest lists. What happens between legs, such as an impulse, stands in the plan: add it to the velocity before
-the next rollout.
+`step_{leg}` is one step of a {stretch} for any step length, `rollout_{leg}` all of its steps, on the mesh that
+the manifest lists. {between}
 
 To plan again, hand the outputs of a plan back as the inputs `guess_...` of `warm_solver`, multipliers too. What
-is no input of the solver is fixed in it: what events are made of, such as the limit of an impulse or a mass
-that is dropped, the meshes, and which impulses are none. An attitude at start or goal must have the sign that
-the guess has there.
+is no input of the solver is fixed in it: {fixed}.
+An attitude at start or goal must have the sign that the guess has there.
 {code}"""
 
+JOINTS = {
+    "others": "each joint",
+    "between": """What happens between legs, such as an impulse, stands in the plan: add it to the
+velocity before the next rollout.""",
+    "fixed": """what events are made of, such as the limit of an impulse or a mass
+that is dropped, the meshes, and which impulses are none""",
+}
+
+BODIES = {
+    "others": "what holds between bodies",
+    "between": """All bodies have one mesh and one clock.""",
+    "fixed": "the distances that bodies keep, and the mesh",
+}
+
 MISSION_CODE = """
-C: `c/functions.c` needs nothing but the mathematical library; `c/mission.h` documents it.
+C: `c/functions.c` needs nothing but the mathematical library; `c/{kind}.h` documents it.
 """
 
 
 def mission_readme(planner: MissionPlanner, c: bool) -> str:
-    """The text for a mission, with or without C code."""
-    legs = ", ".join(f"`{name}`" for name in planner.names)
+    """The text for a mission or a team, with or without C code."""
+    alone = planner.stretch == "leg"
+    mass = "mass" if alone else f"{planner.names[0]}_mass"
     return MISSION.format(
-        name=planner.mission.name, legs=legs, leg=planner.names[0], code=MISSION_CODE if c else ""
+        name=planner.mission.name,
+        legs=", ".join(f"`{name}`" for name in planner.names),
+        leg=planner.names[0],
+        kind=planner.kind,
+        stretch=planner.stretch,
+        mass=mass,
+        blank=" " * max(21 - len(mass), 2),
+        code=MISSION_CODE.format(kind=planner.kind) if c else "",
+        **(JOINTS if alone else BODIES),
     )

@@ -11,9 +11,13 @@ from dmoc.basics.arguments import of_kind, short
 from dmoc.basics.files import as_path, whole_file
 from dmoc.films.frames import Scene, scene_of
 from dmoc.plots.mission import scenery
+from dmoc.plots.path import frame as framed
+from dmoc.plots.path import scale_of
+from dmoc.plots.sheet import darkened
 from dmoc.plots.style import AXIS_COLOURS, DARK, PALE, PUSH, SETTINGS, readable
-from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.plots.surroundings import draw_scene
 from dmoc.results.solution import Solution
+from dmoc.surroundings.view import view_of
 
 if TYPE_CHECKING:
     from dmoc.missions.solution import MissionSolution
@@ -32,7 +36,10 @@ NEAR = 1e-9
 
 
 def animate(
-    solution: Solution | MissionSolution | TeamSolution, path: str | os.PathLike, frames: int = 80
+    solution: Solution | MissionSolution | TeamSolution,
+    path: str | os.PathLike,
+    frames: int = 80,
+    dark: bool = False,
 ) -> None:
     """Write a moving picture of a solution, whole or not at all.
 
@@ -46,6 +53,8 @@ def animate(
         Ends in .gif or, where ffmpeg is on the computer, in .mp4.
     frames : int
         Number of frames at even times, 2 to 200; 20 of them are shown a second.
+    dark : bool
+        On a dark background.
 
     Raises
     ------
@@ -69,6 +78,7 @@ def animate(
     with matplotlib.rc_context(SETTINGS), whole_file(path) as temporary:
         page = Figure(figsize=SIZE)
         film = _Film(page, scenery(solution) if several else solution, scene)  # type: ignore[arg-type]
+        darkened(page, dark)
         if as_path(path).suffix.lower() == ".gif":
             _write_gif(film, page, temporary, frames)
             return
@@ -120,14 +130,12 @@ class _Film:
 
     def __init__(self, page: Any, solution: Solution, scene: Scene):
         self.scene, space = scene, scene.axes == 3
-        self.size, unit = readable(np.ptp(scene.everything, axis=0), "m")
         self.late, self.late_unit = readable(scene.times, "s")
         self.axes = page.add_subplot(projection="3d" if space else None)
-        self._surround(solution, space)
+        unit = self._surround(solution, space)
         for i, name in enumerate("xyz"[: scene.axes]):
-            pad = 10 if space else None
             label = f"{name} [{unit}]" if solution.dimension > i else ("" if solution.dimension else name)
-            getattr(self.axes, f"set_{name}label")(label, labelpad=pad)
+            getattr(self.axes, f"set_{name}label")(label)
         if solution.dimension == 1:
             self.axes.set_yticks([])
         self.ahead = [self._line(trail.points, color=PALE, linewidth=1.2) for trail in scene.trails]
@@ -159,15 +167,17 @@ class _Film:
         if named:
             columns = -(-len(named) // rows)
             page.legend(*zip(*named, strict=True), loc="lower center", ncol=columns)
-        if not space:
+        if space:
+            self.axes.set_position((0.0, 0.05 * rows, 1.0, 0.93 - 0.05 * rows))
+        else:
             page.subplots_adjust(bottom=0.12 + 0.05 * rows)
         self.title = self.axes.set_title("", loc="left")
         lines = self.behind, self.kicks, self.links, self.triads, self.pushes, self.bodies
         # All that is not the same in every frame, from what is behind to what is before it.
         self.moving = [*(line for group in lines for line in group), self.title]
 
-    def _surround(self, solution: Solution, space: bool) -> None:
-        """Zones and attractors, and a view that holds all that moves."""
+    def _surround(self, solution: Solution, space: bool) -> str:
+        """Zones and attractors, and a view that holds all that moves; the name of the unit of its axes."""
         from matplotlib.ticker import MaxNLocator
 
         low, high = self.scene.everything.min(axis=0), self.scene.everything.max(axis=0)
@@ -179,13 +189,16 @@ class _Film:
         if space:
             middle, side = 0.5 * (low + high), np.maximum(high - low, 0.2 * (high - low).max())
             low, high = middle - side / 2, middle + side / 2
-            self.axes.set_box_aspect(side)
             self.axes.computed_zorder = False
         else:
             self.axes.set_aspect("equal")
+        self.size, unit = scale_of(self.scene.everything, low, high)
         view = low / self.size, high / self.size
         if solution.dimension == self.scene.axes:
             draw_scene(self.axes, solution, view, self.size)
+        if space:
+            framed(self.axes, view, unit)
+            return unit
         span = view[1] - view[0]
         for i, name in enumerate("xyz"[: self.scene.axes]):
             self.axes.set(**{f"{name}lim": (view[0][i], view[1][i])})
@@ -193,6 +206,7 @@ class _Film:
             # A short side has room for few numbers, and plain ones are drawn five times as fast.
             axis.set_major_locator(MaxNLocator(2 + round(4 * span[i] / span.max())))
             axis.set_major_formatter("{x:g}")
+        return unit
 
     def _line(self, points: np.ndarray, **look: Any) -> Any:
         return self.axes.plot(*points.T / self.size, zorder=5, **look)[0]

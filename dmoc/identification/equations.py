@@ -97,8 +97,8 @@ class Equations:
     rows, residuals : list of Piece
     labels : list of (str, array)
         Of each kind of residual its name and where it stands, shape (entries, count).
-    free : bool array
-        The unknowns that are not known.
+    missing : int
+        How many residuals stand for what was not measured.
     """
 
     setting: Setting
@@ -106,6 +106,7 @@ class Equations:
     residuals: list[Piece] = field(default_factory=list)
     labels: list[tuple[str, np.ndarray]] = field(default_factory=list)
     row_count: int = 0
+    missing: int = 0
     row_scales: np.ndarray = field(default_factory=lambda: np.empty(0))
     row_nodes: np.ndarray = field(default_factory=lambda: np.empty(0))
 
@@ -125,8 +126,11 @@ class Equations:
         self.row_scales = np.append(self.row_scales, np.full(targets.size, scale))
         self.row_nodes = np.append(self.row_nodes, np.repeat(nodes, results))
 
-    def add_residuals(self, name: str, part: tuple, columns: np.ndarray, numbers: np.ndarray) -> None:
-        """Residuals over their standard deviations."""
+    def add_residuals(
+        self, name: str, part: tuple, columns: np.ndarray, numbers: np.ndarray, missing: int = 0
+    ) -> None:
+        """Residuals over their standard deviations, of which so many are 0 since an axis was not measured."""
+        self.missing += missing
         results = part[0][0].size1_out(0)
         targets = self.count + np.arange(results * columns.shape[1]).reshape(-1, results).T
         self.residuals.append(Piece(part[0], part[1], columns, targets, numbers))
@@ -153,13 +157,15 @@ def add_motion(equations: Equations) -> None:
         rows = np.flatnonzero(held[block.targets].all(axis=1))
         if not len(rows):
             continue
-        at_mass = np.flatnonzero(inside == setting.mass_at)
+        inverted = [(j, int(at)) for j, place in setting.inverted for at in np.flatnonzero(inside == place)]
         slopes = setting.slopes[inside]
 
-        def write(block: Any = block, rows: Any = rows, at_mass: Any = at_mass, slopes: Any = slopes) -> tuple:
+        def write(
+            block: Any = block, rows: Any = rows, inverted: Any = inverted, slopes: Any = slopes
+        ) -> tuple:
             z, p = ca.SX.sym("z", len(block.columns)), ca.SX.sym("p", len(slopes))
             d, theta = ca.SX.sym("d", len(block.kernel.used[0])), numbers_of(setting)
-            values = block.kernel.functions["rows"](z, d, scene_numbers(setting, p, at_mass, slopes, theta))
+            values = block.kernel.functions["rows"](z, d, scene_numbers(p, inverted, slopes, theta))
             return [z, theta], [d, p], values[rows.tolist()]
 
         key = "motion", block.kernel, len(setting.wanted), kinds_of(setting), slopes.tobytes(), rows.tobytes()
@@ -183,13 +189,11 @@ def numbers_of(setting: Setting) -> ca.SX:
     return ca.SX.sym("theta", len(setting.wanted))
 
 
-def scene_numbers(setting: Setting, base: Any, at_mass: Any, slopes: np.ndarray, theta: ca.SX) -> Any:
+def scene_numbers(base: Any, inverted: Any, slopes: np.ndarray, theta: ca.SX) -> Any:
     """Parameters of the scene with the numbers in them, from those where the numbers are 0."""
     p = ca.SX(base + ca.sparsify(ca.DM(slopes)) @ theta)
-    for j, one in enumerate(setting.wanted):
-        if one.inverse:
-            for place in at_mass:
-                p[int(place)] = 1 / theta[j]
+    for j, place in inverted:
+        p[place] = 1 / theta[j]
     return p
 
 

@@ -197,9 +197,9 @@ class Estimate:
         """What a person should know before relying on the numbers, a sentence each."""
         return tuple([*on_sight(self), *on_fit(self)])
 
-    def plot(self, path: str | os.PathLike | None = None) -> Any:
-        """The figure: path and residuals, intervals, correlations; with a path, that file."""
-        return shown("estimate")(self, path)
+    def plot(self, path: str | os.PathLike | None = None, dark: bool = False) -> Any:
+        """The figure: path and residuals, intervals, correlations; with a path, that file, dark if asked."""
+        return shown("estimate")(self, path, dark)
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write values, intervals and the fit as JSON, whole or not at all."""

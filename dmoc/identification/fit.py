@@ -186,7 +186,7 @@ def fitted(equations: Equations, fixed: np.ndarray, weight: float) -> Fit:
             system = _system(equations, pattern, weight, x)
     system = known
     residuals = equations.values_at(x)[1]
-    degrees = equations.count + equations.row_count - len(free) - len(setting.wanted)
+    degrees = equations.count - equations.missing + equations.row_count - len(free) - len(setting.wanted)
     return Fit(
         x,
         residuals,
@@ -214,10 +214,10 @@ def _moved(system: System, x: np.ndarray, path: np.ndarray, numbers: np.ndarray)
     """The unknowns after a step, or after as much of it as makes residuals and rows no larger."""
     equations, pattern = system.equations, system.pattern
     setting, before = equations.setting, _merit(system.r, system.c)
-    most = _allowed(setting, x, numbers)
     change = np.zeros_like(x)
     change[pattern.free], change[pattern.numbers] = path, numbers
     change *= setting.scales
+    most = _allowed(setting, x, change)
     for _ in range(MOST_HALVINGS):
         after = _merit_at(equations, x + most * change, system.weight)
         if np.isfinite(after) and after <= before * (1 + 1e-6) + 1e-18:
@@ -237,11 +237,11 @@ def _merit_at(equations: Equations, x: np.ndarray, weight: float) -> float:
         return _merit(r * weight, c * equations.row_scales)
 
 
-def _allowed(setting: Setting, x: np.ndarray, numbers: np.ndarray) -> float:
-    """The part of a step for which masses stay positive."""
-    most = 1.0
-    for j, one in enumerate(setting.wanted):
-        now, change = x[setting.numbers[j]], numbers[j] * one.scale
-        if one.inverse and change < 0 and now + change < now / FACTOR:
-            most = min(most, (now - now / FACTOR) / -change)
-    return most
+def _allowed(setting: Setting, x: np.ndarray, change: np.ndarray) -> float:
+    """The part of a step for which masses, and exhaust velocities, stay positive."""
+    places = setting.numbers[[j for j, one in enumerate(setting.wanted) if one.inverse]]
+    if "mass" in setting.columns:
+        places = np.append(places, setting.columns["mass"].indices)
+    now, falls = x[places], -change[places]
+    far = falls > now * (1 - 1 / FACTOR)
+    return float(np.min(now[far] * (1 - 1 / FACTOR) / falls[far], initial=1.0))

@@ -89,7 +89,8 @@ def add_positions(equations: Equations, sigma: float, offset: Sequence[Any], del
         matrices = turning[there].transpose(2, 1, 0).reshape(axes * axes, -1)
     begun, lengths = flight.times[there] - flight.times[steps], np.diff(flight.times)[steps]
     numbers = np.vstack([np.nan_to_num(y).T, (known / sigma).T, begun[None], lengths[None], matrices])
-    equations.add_residuals("position", made(key, columns.shape[1], write), columns, numbers)
+    part = made(key, columns.shape[1], write)
+    equations.add_residuals("position", part, columns, numbers, int((~known).sum()))
 
 
 def _lagrange(points: np.ndarray, at: Any) -> list[Any]:
@@ -166,7 +167,7 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
         leaving = -dynamics.configuration.along(place, momenta[0])
         speed = dynamics.velocity(t, place, leaving, masses[0])[which.tolist()]
         base = ca.SX.sym("p", p.numel())
-        numbers = scene_numbers(setting, base, [setting.mass_at], setting.slopes, theta)
+        numbers = scene_numbers(base, setting.inverted, setting.slopes, theta)
         result = ca.substitute(weight * (speed - y), p, numbers)
         return [nodes, u, *([masses] if burns else []), theta], [begin, length, y, weight, base], result
 
@@ -191,6 +192,7 @@ def add_speeds(equations: Equations, sigmas: dict[str, float]) -> None:
         made(key, len(there), write),
         equations.with_numbers(np.vstack([*at, force[:, there], *burning])),
         numbers,
+        int((~np.isfinite(measured[there])).sum()),
     )
 
 
@@ -232,7 +234,7 @@ def add_mass(equations: Equations, fixed: np.ndarray) -> None:
     if "mass" not in setting.columns:
         return
     first = setting.columns["mass"].indices[:, :1]
-    asked = [j for j, one in enumerate(setting.wanted) if one.inverse]
+    asked = [j for j, one in enumerate(setting.wanted) if one.kind == "mass"]
     if not asked:
         fixed[first.ravel()] = True
         return

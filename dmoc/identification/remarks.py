@@ -37,7 +37,7 @@ def on_sight(found: Any) -> list[str]:
             said.append(
                 f"{one.name} is hardly observable: the flight adds next to nothing to what was believed."
             )
-        elif one.kind in ("mass", "scene", "strength") and sigma[one.name] > HARDLY * abs(value):
+        elif one.kind in ("mass", "exhaust", "scene", "strength") and sigma[one.name] > HARDLY * abs(value):
             said.append(f"{one.name} is hardly observable: its standard deviation is larger than itfound.")
     alike = found.correlation
     for i, first in enumerate(found.names):

@@ -27,9 +27,6 @@ from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import Units, units_of
 from dmoc.scene.problem import TransferProblem
 
-# The path to begin with has at least this part of the mass at its start [-].
-LEFT = 0.1
-
 
 @dataclass(frozen=True)
 class Setting:
@@ -41,6 +38,8 @@ class Setting:
         The discrete equations, whose parameters are the scene's numbers.
     row_bounds : tuple of arrays
     wanted : tuple of Wanted
+    inverted : tuple of (int, int)
+        The numbers of which the unknown is the inverse, and which parameter of the scene each is.
     """
 
     flight: Flight
@@ -55,6 +54,7 @@ class Setting:
     wanted: tuple[Wanted, ...]
     parameters: np.ndarray
     slopes: np.ndarray
+    inverted: tuple[tuple[int, int], ...]
 
     @classmethod
     def of(cls, flight: Flight, problem: TransferProblem, order: int, wanted: Sequence[Wanted]) -> Setting:
@@ -62,14 +62,32 @@ class Setting:
         units = units_of(problem, path)
         nlp, blocks = unassembled(problem, path, units)
         base = nlp.parameters(problem)
-        slopes = np.zeros((len(base), len(wanted)))
+        slopes, inverted = np.zeros((len(base), len(wanted))), []
         for j, one in enumerate(wanted):
+            if one.inverse:
+                # The mass comes behind the origin and the time at the start.
+                other = base if one.changed is None else nlp.parameters(one.changed(problem, 2 * one.value))
+                at = problem.size + 1 if one.changed is None else int(np.flatnonzero(other != base)[0])
+                inverted.append((j, at))
+                continue
             if one.changed is not None:
                 # The parameters are affine in a number; a power of two as its change loses no digit.
                 step = 2.0 ** np.ceil(np.log2(one.scale))
                 slopes[:, j] = (nlp.parameters(one.changed(problem, one.value + step)) - base) / step
         sizes = nlp.columns, nlp.rows, nlp.row_bounds
-        return cls(flight, problem, order, path, units, *sizes, tuple(blocks), tuple(wanted), base, slopes)
+        return cls(
+            flight,
+            problem,
+            order,
+            path,
+            units,
+            *sizes,
+            tuple(blocks),
+            tuple(wanted),
+            base,
+            slopes,
+            tuple(inverted),
+        )
 
     @property
     def rule(self) -> Scheme:
@@ -111,11 +129,6 @@ class Setting:
     def numbers(self) -> np.ndarray:
         """Where the numbers stand among the unknowns."""
         return self.size + np.arange(len(self.wanted))
-
-    @property
-    def mass_at(self) -> int:
-        """Which parameter the mass is: it comes behind the origin and the time at the start."""
-        return self.problem.size + 1
 
     @cached_property
     def writer(self) -> Writer:
@@ -164,8 +177,12 @@ def first_path(flight: Flight, problem: TransferProblem, order: int) -> Discrete
         mesh, order, True, flight.duration, place, forces, mass, ends[0], ends[1], made_of=several
     )
     masses = node_masses(Dynamics.of(problem), path, float(problem.mass))
-    # A mass that is thought to be too small would be burnt away.
-    return replace(path, mass=np.maximum(masses, LEFT * float(problem.mass)))
+    if (least := float(masses.min())) <= 0:
+        raise ValueError(
+            f"a mass of {problem.mass:g} kg burns away: the commands burn {problem.mass - least:.3g} kg at an "
+            f"exhaust velocity of {problem.actuator.exhaust_velocity:g} m/s; begin with more of either"
+        )
+    return replace(path, mass=masses)
 
 
 def _smooth(times: np.ndarray, given: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -212,7 +212,7 @@ def wanted_of(
     speed: Any = getattr(problem.actuator, "exhaust_velocity", None)
     if is_unknown(speed):
         name = "exhaust_velocity"
-        found.append(Wanted(name, "m/s", float(speed), speed.sigma, "scene", 0, exhaust_changed))
+        found.append(Wanted(name, "m/s", float(speed), speed.sigma, "exhaust", 0, exhaust_changed))
     found += of_vector(
         "strength",
         ties.strength if len(ties.strength) > 1 else ties.strength[0],

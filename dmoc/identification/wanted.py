@@ -30,8 +30,8 @@ class Wanted:
     sigma : float or None
         Standard deviation of that belief; None if nothing is known.
     kind : str
-        "mass"; "scene" for other numbers of the equations of motion; or of what ties them to the flight:
-        "offset", "strength", "turn", "delay"; "center" is both, and "tilt" is of the scene.
+        "mass", "exhaust" velocity; "scene" for other numbers of the equations of motion; or of what ties them
+        to the flight: "offset", "strength", "turn", "delay"; "center" is both, and "tilt" is of the scene.
     index : int
         Which axis, control or turn it is.
     changed : callable or None
@@ -48,8 +48,8 @@ class Wanted:
 
     @property
     def inverse(self) -> bool:
-        """Whether 1 over it is what is solved for: the equations are linear in that of the mass."""
-        return self.kind == "mass"
+        """Whether 1 over it is what is solved for, in which the equations are linear."""
+        return self.kind in ("mass", "exhaust")
 
     @property
     def begin(self) -> float:

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
 from dmoc.effects.base import Body, Part
@@ -80,6 +81,19 @@ class Holonomic(Part):
     def lines(self, at: dict[str, Body]) -> list[np.ndarray]:
         """Lines that a picture draws of it for states of bodies, (times, points, dimension) each [m]."""
         return []
+
+    def level(self, dimension: int) -> ca.Function | None:
+        """The one number that is zero where its body may be, of its position [m], for a picture.
+
+        None where it is no surface, and no wire in the plane: of attitudes, of several bodies or numbers, or of
+        a link that has `lines`.
+        """
+        own = type(self).lines is Holonomic.lines
+        if not own or self.joins_attitudes or len(self.holds) > 1:
+            return None
+        q = ca.SX.sym("q", dimension)
+        g = ca.SX(self.g(q))
+        return ca.Function("level", [q], [g]) if g.numel() == 1 else None
 
     def check_dimension(self, dimension: int) -> None:
         """Raise ValueError if the link has no meaning in this many dimensions."""

@@ -59,6 +59,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     legs = tuple(
         _leg_solution(mission, i, path, costs[i], status, climb.levels[-1]) for i in range(len(path.legs))
     )
+    steps = ", ".join(str(leg.steps) for leg in legs)
     if status == "solved":
         message, success = "a local optimum", True
     else:
@@ -88,7 +89,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         warnings=_warnings(mission, legs) if success else (),
         tolerance=tol,
         error=error,
-        reason=f"{len(legs)} legs of {', '.join(str(leg.steps) for leg in legs)} steps",
+        reason=f"{len(legs)} legs of {steps} steps{climb.told}",
         provenance=replace(about, options=climb.options),
     )
 

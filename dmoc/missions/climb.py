@@ -13,19 +13,20 @@ from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Answer, Interrupt, Watch
+from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
+from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
-from dmoc.results.estimate import local_errors
+from dmoc.results.estimate import left_after, local_errors
 from dmoc.results.facts import Error, Level
 from dmoc.rungs.rung import rounded
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
-from dmoc.solver.meshes import WIDEST_ROUNDING
 from dmoc.solver.solve import check_numerics
 
 # An attempt from a guess ends after this many iterations.
@@ -36,6 +37,8 @@ ACCURATE, MOST_MENDED = 1e-5, 3
 SHARP = 1e-12
 # There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
 STAYING = 1.0
+# Where the cost hardly depends on where legs end the path stays nearer: Ipopt would else leave the valley.
+VALLEY = 1e-2
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -70,6 +73,8 @@ class Climb:
     program: Any = MissionProgram
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
+    # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
+    valley: tuple[float, float] | None = None
 
     def __init__(self, mission: Any, options: Any, progress: Any, compiled: bool, time_limit: float | None):
         self.mission, self.options, self.progress = mission, options or {}, progress
@@ -78,8 +83,8 @@ class Climb:
         self.levels: list[Level] = []
         # The last attempt that solved the mission itself, not one whose |F| is rounded more widely.
         self.held: Attempt | None = None
-        # What is in the way, where no attempt succeeded.
-        self.reason = ""
+        # What is in the way, where no attempt succeeded, and what another start led to.
+        self.reason = self.told = ""
 
     def attempt(
         self,
@@ -103,7 +108,7 @@ class Climb:
             limits["ipopt.tol"] = SHARP
         if near is not None:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
-            limits["ipopt.theta_max_fact"] = STAYING
+            limits["ipopt.theta_max_fact"] = STAYING if self.valley is None else VALLEY
         built = time.perf_counter() - begun
         answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
         if watch.error is not None:
@@ -133,12 +138,11 @@ class Climb:
 
     def from_guess(self, path: MissionPath) -> Attempt:
         """The first answer: |F| rounded widely at first, and other durations where that fails."""
-        stages = self._stages()
-        tried = self._staged(path, stages)
+        tried = self.staged(path)
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
         for factor in OTHER_DURATIONS:
-            other = self._staged(path.stretched(self.mission, factor), stages)
+            other = self.staged(path.stretched(self.mission, factor))
             if other.solved or other.answer.status == "stopped":
                 return other
         return tried
@@ -149,10 +153,11 @@ class Climb:
             return failed
         starts = path, cold(failed.path)
         near, self.reason = mission_cause(failed.program, starts, self.levels.append, self.interrupt)
-        return failed if near is None else self._staged(near, self._stages())
+        return failed if near is None else self.staged(near)
 
-    def _staged(self, path: MissionPath, stages: list[float | None]) -> Attempt:
-        for i, width in enumerate(stages):
+    def staged(self, path: MissionPath) -> Attempt:
+        """An answer from a path that may be far from it, with |F| rounded widely at first."""
+        for i, width in enumerate(self._stages()):
             tried = self.attempt(path, width, MOST_TRYING, carried=i > 0)
             if not tried.solved:
                 return tried
@@ -199,15 +204,13 @@ class Climb:
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
-            rest = _left(changes) if changes else 0.0
+            rest = left_after(changes) if changes else 0.0
             if tol is None and _largest(errors) <= accurate and rest <= still:
                 break
             onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
-            found = self.attempt(onto, carried=True)
-            if not found.solved and found.answer.status != "stopped":
-                found = self.attempt(cold(onto), carried=True)
+            found = self.on_finer(onto)
             if found.answer.status == "stopped":
                 return found, error, False
             if not found.solved:
@@ -221,6 +224,15 @@ class Climb:
                     return attempt, error, True
         return attempt, error, tol is None
 
+    def on_finer(self, onto: MissionPath, most: int | None = None) -> Attempt:
+        """The answer on finer meshes, from that on coarser ones."""
+        if self.valley is not None:
+            return self.attempt(cold(onto), near=self.valley, most=2 * MOST_TRYING)
+        found = self.attempt(onto, carried=True, most=most)
+        if found.solved or found.answer.status == "stopped" or most is not None:
+            return found
+        return self.attempt(cold(onto), carried=True)
+
     def largest_error(self, attempt: Attempt) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
         return _largest(self._errors(attempt))
@@ -230,7 +242,7 @@ class Climb:
         path, missed = attempt.path, 0.0
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
-        return Error(summed, _left(changes), missed)
+        return Error(summed, left_after(changes), missed)
 
     def _errors(self, attempt: Attempt) -> list[np.ndarray]:
         path = attempt.path
@@ -265,6 +277,8 @@ def solve_mission(
             first = climb.explained(path, first)
         if not first.solved:
             return answered(climb, first)
+        if not path.warm and guess is None:
+            first = with_best_drops(climb, first, lambda one: first_path(one, order, steps, hold, None))
         first = straightened(climb, first, MOST_TRYING)
         first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
         if steps is not None and tol is None:
@@ -280,13 +294,6 @@ def _change(coarse: Attempt, fine: Attempt) -> float:
     """What the objective changes from mesh to mesh, of itself [-]."""
     scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
     return abs(fine.level.objective - coarse.level.objective) / scale
-
-
-def _left(changes: list[float]) -> float:
-    """The error left after the last change: as much as it, or less where changes fall fast."""
-    last = changes[-1]
-    fall = changes[-2] / last if len(changes) > 1 and last > 0 else 0.0
-    return last / (fall - 1) if fall > 2 else last
 
 
 def _rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:

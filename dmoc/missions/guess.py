@@ -17,13 +17,13 @@ from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
+from dmoc.meshes.choices import A_TURN, UNEVEN
 from dmoc.missions.arcs import cheapest_arc
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import A_TURN, UNEVEN
 
 # A leg has this order if none is asked for: inside a leg nothing switches, so that a high order pays.
 ORDER = 6

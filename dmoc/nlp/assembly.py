@@ -101,13 +101,16 @@ class Assembly:
         """The last entries of p for other units or another mesh; none where these are constants."""
         if not self.parametric:
             return np.empty(0)
-        products = [
-            side[np.array(matrix.sparsity_out(place).row(), int)]
-            * scaling.columns[np.array(matrix.sparsity_out(place).get_col(), int)]
-            for side, matrix, place in ((scaling.rows, self.jacobian, 1), (scaling.columns, self.hessian, 0))
-        ]
+        pairs = zip((scaling.rows, scaling.columns), self._entries, strict=True)
+        products = [side[row] * scaling.columns[column] for side, (row, column) in pairs]
         values = [given.ravel(order="F") for given in scaling.values]
         return np.concatenate([scaling.columns, scaling.rows, [scaling.cost], *values, *products])
+
+    @cached_property
+    def _entries(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Rows and columns of the entries of Jacobian and Hessian."""
+        patterns = self.jacobian.sparsity_out(1), self.hessian.sparsity_out(0)
+        return [(np.array(pattern.row(), int), np.array(pattern.get_col(), int)) for pattern in patterns]
 
     @cached_property
     def leaning(self) -> Assembly:
@@ -220,7 +223,9 @@ def _evaluated(
     """Kind and value of every result of a block that is not zero by its structure, one column an evaluation."""
     kernel, count = block.kernel, block.count
     p = [block.first + place for place in kernel.used[1]]
-    given = [_columns(unknowns, block.columns), values, ca.repmat(parameters[p], 1, count)]
+    # Of an empty matrix repeated CasADi writes C code that newer compilers refuse.
+    same = ca.repmat(parameters[p], 1, count) if p else ca.MX(0, count)
+    given = [_columns(unknowns, block.columns), values, same]
     dual = [_columns(multipliers, block.targets), ca.repmat(weight, 1, count)]
     for kind, function in (kernel.compiled if compiled else kernel.functions).items():
         if function.numel_out(0) and (kernel.costly or kind not in ("cost", "gradient")):

@@ -74,9 +74,10 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     force = max(force, LEAST_SHARE * typical) if force else typical
     torque = _torque(problem, guess, force * length)
     sizes = np.where(forces, force, torque)
-    cost = max(abs(cost_along(problem, guess)), abs(cost_along(problem, guess, sizes)))
     # All nozzles at once make no force, or next to none by rounding; one of them does.
-    alone = abs(cost_along(problem, guess, sizes * (np.arange(len(sizes)) == 0)))
+    first = sizes * (np.arange(len(sizes)) == 0)
+    along, all_the_way, alone = map(abs, _costs_along(problem, guess, sizes, first))
+    cost = max(along, all_the_way)
     cost = (cost if cost > LEAST_SHARE * alone else alone) or 1.0
     return Units(length, time, force, problem.mass, cost, torque, origin)
 
@@ -103,23 +104,34 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     return max(used, LEAST_SHARE * typical) if used else typical
 
 
-def cost_along(problem: TransferProblem, guess: DiscretePath, instead: np.ndarray | None = None) -> float:
-    """About the objective along a guess, with the controls `instead` all the way if they are given.
+def cost_along(problem: TransferProblem, guess: DiscretePath) -> float:
+    """About the objective along a guess."""
+    return _costs_along(problem, guess)[0]
+
+
+def _costs_along(problem: TransferProblem, guess: DiscretePath, *instead: np.ndarray) -> list[float]:
+    """About the objective along a guess, and with each of these controls all the way.
 
     A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
     node it grows with the number of steps, so at the ends no more counts than the largest force in between.
     """
     rate, terminal = cost_functions(problem)
     some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
-    times = problem.start_time + guess.duration * guess.fractions[some]
+    fractions = guess.fractions[some]
+    times = problem.start_time + guess.duration * fractions
     velocity = np.gradient(guess.place[some], times, axis=0)
-    nodes = np.searchsorted(guess.mesh, guess.fractions[some], side="right") - 1
     sizes = np.linalg.norm(guess.control, axis=1)
     most = sizes[1:-1].max(initial=0.0) or sizes.max()
     control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
-    control = control[np.minimum(nodes, len(guess.mesh) - 2) if guess.hold else some]
-    control = control if instead is None else np.broadcast_to(instead, control.shape)
-    rates = rate(times[None], guess.place[some].T, velocity.T, control.T, guess.mass[some][None])
+    if guess.hold:
+        nodes = np.searchsorted(guess.mesh, fractions, side="right") - 1
+        some_controls = control[np.minimum(nodes, len(guess.mesh) - 2)]
+    else:
+        some_controls = control[some]
+    controls = [some_controls, *(np.broadcast_to(one, some_controls.shape) for one in instead)]
+    along = [times[None], guess.place[some].T, velocity.T, guess.mass[some][None]]
+    t, q, v, m = (np.tile(values, (1, len(controls))) for values in along)
+    rates = np.array(rate(t, q, v, np.concatenate(controls).T, m)).reshape(len(controls), -1)
     last = guess.goal_velocity[guess.coordinates.speeds]
-    end = terminal(times[-1], guess.place[-1], last, guess.mass[-1])
-    return float(np.trapezoid(np.array(rates).ravel(), times)) + float(end)
+    end = float(terminal(times[-1], guess.place[-1], last, guess.mass[-1]))
+    return [float(np.trapezoid(row, times)) + end for row in rates]

@@ -11,18 +11,19 @@ from dmoc.scene.named import attached_as_named
 # What draws and writes is loaded where it is asked for: a fact takes a tenth of the time that takes.
 
 
-def plot(solution: Any, path: str | os.PathLike | None = None) -> Any:
+def plot(solution: Any, path: str | os.PathLike | None = None, dark: bool = False) -> Any:
     """`Solution.plot`."""
     from dmoc.plots.page import figure, save_figure
+    from dmoc.plots.sheet import darkened
 
-    return figure(solution) if path is None else save_figure(solution, path)
+    return darkened(figure(solution), dark) if path is None else save_figure(solution, path, dark=dark)
 
 
-def animate(solution: Any, path: str | os.PathLike, frames: int = 80) -> None:
+def animate(solution: Any, path: str | os.PathLike, frames: int = 80, dark: bool = False) -> None:
     """`Solution.animate`."""
     from dmoc.films.film import animate as write
 
-    write(solution, path, frames)
+    write(solution, path, frames, dark)
 
 
 def facts(solution: Any) -> Facts:
@@ -44,10 +45,11 @@ def table(solution: Any) -> Any:
     return node_table(solution)
 
 
-def estimate(found: Any, path: str | os.PathLike | None = None) -> Any:
+def estimate(found: Any, path: str | os.PathLike | None = None, dark: bool = False) -> Any:
     """`Estimate.plot`."""
     from dmoc.charts.identification import estimate_figure
     from dmoc.charts.study import save_page
+    from dmoc.plots.sheet import darkened
 
     page = estimate_figure(found)
-    return page if path is None else save_page(page, path)
+    return darkened(page, dark) if path is None else save_page(page, path, dark=dark)

@@ -26,8 +26,7 @@ def bundle_file() -> Path:
         if (file := Path(folder, *INSIDE)).is_file():
             return file
     raise ValueError(
-        "a page is drawn by plotly.js, which comes with plotly, and that is not installed: "
-        "pip install 'dmoc[report]'"
+        "a page is drawn by plotly.js, which comes with plotly, and that is not installed: pip install plotly"
     )
 
 

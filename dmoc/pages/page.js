@@ -202,7 +202,9 @@ const stage = {
         yaxis: { ...axis(), range: view[1], title: label("y"), zeroline: false, scaleanchor: "x" },
       };
     }
-    const grow = 1.4 / Math.hypot(...shape), rise = (flat ? 48 : 24) * Math.PI / 180, side = -Math.PI / 3, far = 1.75;
+    // On a narrow screen the letters take more of the room, so that the box is seen from further away.
+    const far = this.place.clientWidth < 500 ? 2.2 : 1.75;
+    const grow = 1.4 / Math.hypot(...shape), rise = (flat ? 48 : 24) * Math.PI / 180, side = -Math.PI / 3;
     const eye = { x: far * Math.cos(rise) * Math.cos(side), y: far * Math.cos(rise) * Math.sin(side), z: far * Math.sin(rise) };
     const wall = (name, i) => ({ ...axis(), gridcolor: colour("edge"), range: view[i], title: label(name), showbackground: false, showspikes: false, nticks: 2 + Math.round(4 * shape[i]) });
     return {
@@ -235,6 +237,7 @@ const stage = {
       const stops = scaled.map(([at, of]) => `<stop offset="${at}" stop-color="${themed(of)}"/>`).join("");
       return `<svg viewBox="0 0 22 9"><defs><linearGradient id="force">${stops}</linearGradient></defs><rect y="2" width="22" height="5" rx="2" fill="url(#force)"/></svg>`;
     }
+    if (trace.type === "mesh3d") return swatch({ colour: trace.color, fill: true });
     if (trace.type === "surface") return swatch({ colour: trace.colorscale[0][1], fill: true });
     if (trace.fill) return swatch({ colour: trace.fillcolor, fill: true });
     if (trace.mode === "markers") return swatch({ colour: trace.marker.color, dash: "none", symbol: trace.marker.symbol });
@@ -253,10 +256,11 @@ const stage = {
       update[name] = moving.map(({ frames }) => frames[Math.min(frame, frames.length - 1)].map((point) => point[i]));
     });
     if (moving.length) Plotly.restyle(this.place, update, this.moving);
+    const reach = Math.max(...shown.stage.view.flat().map(Math.abs));
     const bodies = moving.filter(({ mode }) => mode === "markers");
     const words = bodies.slice(0, 4).map(({ name, frames }) => {
       const [place] = frames[frame];
-      return `${bodies.length > 1 ? name : "at"} (${place.map(told).join(", ")})`;
+      return `${bodies.length > 1 ? name : "at"} (${place.map((value) => told(value, reach)).join(", ")})`;
     });
     document.getElementById("place").innerHTML = words.length && unit ? `${words.join("   ")} ${unit}` : "";
   },

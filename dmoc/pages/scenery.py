@@ -10,24 +10,26 @@ from matplotlib.figure import Figure
 from dmoc.pages.traces import apart, line, rounded, trace
 from dmoc.parts.outline import Ball, Box, Cone
 from dmoc.plots.style import FORBIDDEN, PALE
-from dmoc.plots.surroundings import (
+from dmoc.plots.surroundings import colour_of, draw_region
+from dmoc.surroundings.levels import level_surface
+from dmoc.surroundings.regions import Region, regions
+from dmoc.surroundings.view import (
     Corners,
     attractors,
-    colour_of,
     cone_surface,
-    draw_region,
     outlines,
     room_edges,
     sources,
     ways,
     within,
-    without_outline,
 )
 
 # A circle has so many points, a sphere so many around and so many from pole to pole.
 ROUND, AROUND, DOWN = 121, 37, 19
 # Zones can be seen through: so much of them covers what is behind [-].
 CLEAR = 0.3
+# Light from all sides: the far side of a sphere would be black.
+LIGHTING = {"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 0.9}
 
 
 def scenery_traces(around: Any, view: Corners, size: float) -> list[dict[str, Any]]:
@@ -42,7 +44,8 @@ def scenery_traces(around: Any, view: Corners, size: float) -> list[dict[str, An
             found += [_dashed(edge.T, "keep-in zone") for edge in edges]
         elif isinstance(shape, Cone):
             found += _cone(cone_surface(around, shape) / size)
-    found += [_area(edges / size, zone, name, CLEAR) for name, edges in _regions(around, view)]
+    for region in regions(around):
+        found += _region(region, view, size, zone)
     for way in ways(around):
         look = line(within(way.points, view) / size, way.name, PALE, 1.5)
         look["line"]["dash"] = "dot"
@@ -57,17 +60,28 @@ def scenery_traces(around: Any, view: Corners, size: float) -> list[dict[str, An
     return found
 
 
-def _regions(around: Any, view: Corners) -> list[tuple[str, np.ndarray]]:
-    """Names and edges [m] of regions in the plane that tell no shape of theirs, the edges of one in one."""
-    found = []
-    for zone in without_outline(around):
-        axes = Figure().add_subplot()
-        if draw_region(axes, zone, view, 1.0):
-            polygons = [
-                np.asarray(edge) for path in axes.collections[0].get_paths() for edge in path.to_polygons()
-            ]
-            found.append((f"forbidden by {type(zone).__name__}", apart(polygons)))
-    return found
+def _region(region: Region, view: Corners, size: float, zone: str) -> list[dict[str, Any]]:
+    """A region or a link that tells no shape of its own; nothing where none of it is in view."""
+    if len(view[0]) == 3:
+        places, triangles = level_surface(region.values, *view)
+        if not len(triangles):
+            return []
+        corners = {axis: rounded(part) for axis, part in zip("xyz", places.T / size, strict=True)}
+        sides = {name: part.tolist() for name, part in zip("ijk", triangles.T, strict=True)}
+        look = {"color": PALE if region.held else zone, "opacity": CLEAR, "lighting": LIGHTING}
+        return [{"type": "mesh3d", "name": region.name, "hoverinfo": "name", **corners, **sides, **look}]
+    axes = Figure().add_subplot()
+    if not draw_region(axes, region, view, 1.0):
+        return []
+    paths = axes.collections[0].get_paths()
+    for path in paths:
+        # matplotlib leaves out points that are near each other in pixels, which these places are not in
+        path.should_simplify = False
+    if region.held:
+        lines = apart([np.asarray(part) for path in paths for part in path.to_polygons(closed_only=False)])
+        return [line(within(lines, view) / size, region.name, PALE, 2)]
+    edges = apart([np.asarray(edge) for path in paths for edge in path.to_polygons()])
+    return [_area(edges / size, zone, region.name, CLEAR)]
 
 
 def _ball(center: np.ndarray, radius: float, colour: str, name: str, opacity: float) -> dict[str, Any]:
@@ -83,8 +97,7 @@ def _ball(center: np.ndarray, radius: float, colour: str, name: str, opacity: fl
 def _surface(points: np.ndarray, colour: str, name: str, opacity: float) -> dict[str, Any]:
     """A surface of one colour through a grid of points, shape (3, rows, columns)."""
     look: dict[str, Any] = {"colorscale": [[0, colour], [1, colour]], "showscale": False, "opacity": opacity}
-    # Light from all sides: the far side of a sphere would be black.
-    look["lighting"] = {"ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 0.9}
+    look["lighting"] = LIGHTING
     look |= {"contours": {axis: {"highlight": False} for axis in "xyz"}}
     places = {axis: rounded(part) for axis, part in zip("xyz", points, strict=True)}
     return {"type": "surface", "name": name, "hoverinfo": "name", **places, **look}

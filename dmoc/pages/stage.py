@@ -13,8 +13,8 @@ from dmoc.pages.traces import INK, apart, line, rounded, trace
 from dmoc.plots.mission import scenery
 from dmoc.plots.path import scale_of
 from dmoc.plots.style import AXIS_COLOURS, FORBIDDEN, PUSH, flown_force, readable, within_steps
-from dmoc.plots.surroundings import view_of
 from dmoc.plots.turning import globe_lines
+from dmoc.surroundings.view import view_of
 
 # The body is shown at so many times.
 FRAMES = 241

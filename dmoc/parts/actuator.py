@@ -175,7 +175,7 @@ class Actuator(Duties):
         """The same actuator with the magnitude of its force among the controls, which least fuel needs."""
         raise ValueError(
             f"least fuel with {type(self).__name__} has no optimum: impulses without limit cost least; "
-            "use BallForce(limit), BoxForce(limit) or Engine(max_thrust, ...)"
+            "use BallForce(limit), BoxForce(limit) or Engine(max_thrust, ...); a leg without a force is a Coast"
         )
 
     def force_limit(self) -> float | None:

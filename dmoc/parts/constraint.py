@@ -34,7 +34,7 @@ class Constraint(Duties):
 
     4. `violation`: what the violation of a row means in the problem's own units.
     5. `eased` and `needs`: how loose the limit would have to be, and how to say so.
-    6. `outline`: its shape in a picture; without one, a picture in the plane shows where `excess` is positive.
+    6. `outline`: its shape in a picture; without one, a picture shows the edge of where `excess` is positive.
     7. `ways_round` and `off_centre`: how a starting path gets past it.
     8. `feature`: the size of the smallest thing that a path must not step over.
     9. `clearance`: how far a place is from breaking it, which `facts` of an answer tell.

@@ -16,7 +16,7 @@ from dmoc.planets.dates import date_of
 # The environment variable that names the file of an ephemeris.
 VARIABLE = "DMOC_EPHEMERIS"
 # How the packages are installed that bring the default ephemeris and what reads it.
-INSTALL = "pip install 'dmoc[planets]'"
+INSTALL = "pip install jplephem skyfield-data"
 # NAIF's numbers of bodies, the planet itself before the barycentre of its system.
 NUMBERS: dict[str, tuple[int, ...]] = {
     "solar system barycenter": (0,),

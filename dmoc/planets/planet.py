@@ -48,9 +48,9 @@ def planet(
     through it to be off by less than 1 km in the middle between its times; velocity and acceleration are
     continuous. They are geometric: without light time.
 
-    Without the packages that `pip install 'dmoc[planets]'` brings they are from mean elements instead, for the
-    years 1800 to 2050, as far from the ephemeris as 8,000 km (Mercury), 16,000 (Venus), 23,000 (Earth, put at
-    the barycentre of Earth and Moon), 110,000 (Mars), 2,000,000 (Jupiter), 5,500,000 (Saturn), 1,800,000
+    Without the packages that `pip install jplephem skyfield-data` brings they are from mean elements, for
+    the years 1800 to 2050, as far from the ephemeris as 8,000 km (Mercury), 16,000 (Venus), 23,000 (Earth, put
+    at the barycentre of Earth and Moon), 110,000 (Mars), 2,000,000 (Jupiter), 5,500,000 (Saturn), 1,800,000
     (Uranus, Neptune), measured from 1900 to 2050. The scene says so.
 
     Parameters

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -38,9 +38,9 @@ class Part(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """What the unknowns of a leg are called: shapes by name, unit and meaning by the whole argument."""
+    """What the unknowns of a leg are called: arguments and shapes by name, unit and meaning by the argument."""
 
-    name: str
+    arguments: dict[str, str]
     shapes: dict[str, tuple[int, int]]
     terms: dict[str, Term]
 
@@ -53,6 +53,9 @@ class MissionPlanner:
     path: MissionPath
     scenes: tuple[Scene, ...]
     names: tuple[str, ...]
+    # What it is and what its parts are, for people.
+    kind: ClassVar[str] = "mission"
+    stretch: ClassVar[str] = "leg"
 
     @classmethod
     def of(
@@ -67,7 +70,7 @@ class MissionPlanner:
             )
         path = first_path(mission, order, steps, hold, guess)
         scenes = tuple(
-            Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, _uneven(leg.mesh))
+            Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, uneven(leg.mesh))
             for problem, leg in zip(mission.stretches, path.legs, strict=True)
         )
         program = MissionProgram.of(mission, mission.stretches, path)
@@ -97,17 +100,20 @@ class MissionPlanner:
         for name, words, scene in zip(self.names, self.mission.leg_names, self.scenes, strict=True):
             plan = [*scene.names("places"), *scene.names("speed", "start_"), *scene.names("speed", "goal_")]
             plan += ["forces"] * bool(scene.controls) + ["reactions"] * scene.held
-            plan += ["masses" if scene.burns else "mass", "start_time"]
-            plan += ["duration"] * scene.problem.free_duration
-            terms = {one: scene.terms.get(one) or TERMS[one] for one in plan}
-            found.append(
-                Stage(
-                    name,
-                    {one: scene.shape(one) for one in plan},
-                    {f"{name}_{one}": Term(term.unit, f"{words}: {term.words}") for one, term in terms.items()},
-                )
-            )
+            plan += self._unknowns(scene)
+            called = {one: f"{name}_{self._called(one)}" for one in plan}
+            terms = {called[one]: scene.terms.get(one) or TERMS[one] for one in plan}
+            terms = {one: Term(term.unit, f"{words}: {term.words}") for one, term in terms.items()}
+            found.append(Stage(called, {one: scene.shape(one) for one in plan}, terms))
         return found
+
+    def _unknowns(self, scene: Scene) -> list[str]:
+        """What a leg has beside places, velocities and forces."""
+        return ["masses" if scene.burns else "mass", "start_time", *["duration"] * scene.problem.free_duration]
+
+    def _called(self, unknown: str) -> str:
+        """What an unknown of a leg is called behind the name of that."""
+        return unknown
 
     @cached_property
     def joints(self) -> dict[str, tuple[int, Term]]:
@@ -138,7 +144,7 @@ class MissionPlanner:
 
     def symbols(self) -> dict[str, ca.MX]:
         """Symbols for all unknowns [SI]."""
-        shapes = {f"{leg.name}_{name}": shape for leg in self.legs for name, shape in leg.shapes.items()}
+        shapes = {leg.arguments[name]: shape for leg in self.legs for name, shape in leg.shapes.items()}
         shapes |= {name: (size, 1) for name, (size, _) in self.joints.items()}
         return {name: ca.MX.sym(name, *shape) for name, shape in shapes.items()}
 
@@ -146,13 +152,13 @@ class MissionPlanner:
         """Scaled unknowns."""
         parts = []
         for leg, scene, placed in zip(self.legs, self.scenes, self.program.legs, strict=True):
-            mine = {name: plan[f"{leg.name}_{name}"] for name in leg.shapes}
+            mine = {name: plan[argument] for name, argument in leg.arguments.items()}
             values = {
                 "position": scene.joined(mine, "places") - ca.DM(placed.program.units.origin),
                 "force": mine.get("forces", ca.MX(0, 1)),
                 "mass": mine.get("masses"),
                 LEG_MASS: mine.get("mass"),
-                LEG_START: mine["start_time"],
+                LEG_START: mine.get("start_time"),
                 "reaction": mine.get("reactions"),
                 "start.velocity": scene.joined(mine, "speed", "start_"),
                 "goal.velocity": scene.joined(mine, "speed", "goal_"),
@@ -171,10 +177,10 @@ class MissionPlanner:
             mine = scene.parted(get["position"] + ca.DM(program.units.origin), "places")
             for end in ("start", "goal"):
                 mine |= scene.parted(get[f"{end}.velocity"], "speed", f"{end}_")
-            mine |= {"forces": get["force"], "start_time": get[LEG_START]}
-            mine |= {"masses": get["mass"]} if scene.burns else {"mass": get[LEG_MASS]}
+            mine |= {"forces": get["force"], "start_time": get.get(LEG_START)}
+            mine |= {"masses": get.get("mass"), "mass": get.get(LEG_MASS)}
             mine |= {"reactions": get.get("reaction"), "duration": get.get("duration")}
-            found |= {f"{leg.name}_{name}": mine[name] for name in leg.shapes}
+            found |= {argument: mine[name] for name, argument in leg.arguments.items()}
         first = self.program.legs[-1].columns + self.program.legs[-1].program.columns.size
         return found | rows_of(values[first:], {name: size for name, (size, _) in self.joints.items()})
 
@@ -201,13 +207,13 @@ class MissionPlanner:
         return sides["column"], sides["row"]
 
 
-def identifiers(names: Sequence[str]) -> tuple[str, ...]:
+def identifiers(names: Sequence[str], kind: str = "leg") -> tuple[str, ...]:
     """Names of legs as names of arguments; where one cannot be one, or is there twice, leg_1 and so on."""
     made = [identifier(name) for name in names]
     return tuple(
         name
         if name[:1].isalpha() and made.count(name) == 1 and name.split("_")[0] not in TAKEN
-        else f"leg_{i + 1}"
+        else f"{kind}_{i + 1}"
         for i, name in enumerate(made)
     )
 
@@ -217,7 +223,7 @@ def identifier(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
 
 
-def _uneven(mesh: np.ndarray) -> tuple[float, ...]:
+def uneven(mesh: np.ndarray) -> tuple[float, ...]:
     """The mesh, unless its steps are equal."""
     return () if np.allclose(mesh, uniform_mesh(len(mesh) - 1), rtol=0, atol=1e-14) else tuple(map(float, mesh))
 

@@ -1,4 +1,4 @@
-"""The functions of a mission: step and rollout of each leg, residual, cost and solver of all legs together."""
+"""The functions of a mission or team: step and rollout of each leg or body, the rest of all together."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNITS = {"dynamics_attitude": "N m", "dynamics_wheels": "N m"}
 
 
 def mission_functions(planner: MissionPlanner, options: dict[str, Any] | None = None) -> list[Exported]:
-    """All functions of a mission; `coded` of them can become C code."""
+    """All functions of a mission or team; `coded` of them can become C code."""
     legs = []
     for name, words, scene in zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True):
         for made in (one_step(scene, f"step_{name}"), all_steps(scene, f"rollout_{name}")):
@@ -47,8 +47,11 @@ def residual(planner: MissionPlanner) -> Exported:
     lower, upper, low, high, p = planner.numbers.bounds_and_parameters(numbers)
     x = planner.pack(plan)
     g = planner.program.assembly().constraints(x, p)
-    found = _rows(planner, g, low, high, p, plan) | {"violation": _violation((x, lower, upper), (g, low, high))}
-    words = "rows of all legs and joints of a path, less what their bounds allow"
+    found = _rows(planner, g, low, high, p, numbers | plan) | {
+        "violation": _violation((x, lower, upper), (g, low, high))
+    }
+    parts = "legs and joints" if planner.stretch == "leg" else "bodies and of what holds between them"
+    words = f"rows of all {parts} of a path, less what their bounds allow"
     terms = planner.numbers.terms | planner.terms | _row_terms(planner)
     return Exported(_pruned("residual", numbers, plan, found, planner), words, terms)
 
@@ -87,7 +90,7 @@ def solver(planner: MissionPlanner, options: dict[str, Any] | None, warm: bool) 
         ubg=high,
     )
     flown = planner.unpack(found["x"])
-    rows = _rows(planner, found["g"], low, high, p, flown)
+    rows = _rows(planner, found["g"], low, high, p, numbers | flown)
     forces = [ca.vec(value) for name, value in rows.items() if _row_terms(planner)[name].unit == "N"]
     outputs = {
         **flown,
@@ -99,9 +102,9 @@ def solver(planner: MissionPlanner, options: dict[str, Any] | None, warm: bool) 
         "violation": _violation((found["x"], lower, upper), (found["g"], low, high)),
     }
     given = numbers | {f"guess_{name}": symbol for name, symbol in (plan | lam).items()}
-    name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of all legs")
+    name, words = ("warm_solver", "from a former plan") if warm else ("solver", "from a guess of all of it")
     function = named(name, given, outputs)
-    return Exported(function, f"Ipopt's solution of the mission, {words}", _solver_terms(planner))
+    return Exported(function, f"Ipopt's solution of the {planner.kind}, {words}", _solver_terms(planner))
 
 
 def nominal(planner: MissionPlanner) -> Exported:
@@ -114,7 +117,7 @@ def nominal(planner: MissionPlanner) -> Exported:
         known = _given_back(part, ca.MX(ca.DM(lam)))
         values |= {f"guess_{name}": ca.evalf(value) for name, value in known.items()}
     outputs = {name: ca.MX(value) for name, value in values.items()}
-    words = "the mission's own numbers and its guess, named like the inputs of the solver"
+    words = f"the {planner.kind}'s own numbers and its guess, named like the inputs of the solver"
     return Exported(named("nominal", {}, outputs), words, _solver_terms(planner))
 
 
@@ -197,7 +200,7 @@ def _solver_terms(planner: MissionPlanner) -> dict[str, Term]:
     terms = planner.terms | _row_terms(planner)
     terms |= {
         "objective": Term(unit, "the objective, in its own sign"),
-        "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations of all legs"),
+        "largest_residual": Term("N", "largest defect of the discrete Euler-Lagrange equations"),
     }
     for side in planner.multipliers:
         for name in [name for part in side for name in part.sizes]:

@@ -12,9 +12,10 @@ from dmoc.links.along import states_of
 from dmoc.links.joint import room
 from dmoc.plots.path import entries_once
 from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, readable, within_steps
-from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.plots.surroundings import draw_scene
 from dmoc.plots.turning import paths_of_points
 from dmoc.results.solution import Solution
+from dmoc.surroundings.view import view_of
 
 # Links are drawn at this many times.
 TIMES = 9

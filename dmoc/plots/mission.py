@@ -26,9 +26,10 @@ from dmoc.plots.path import (
 )
 from dmoc.plots.sheet import arrange, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import DARK, PALE, PUSH, readable, within_steps
-from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.plots.surroundings import draw_scene
 from dmoc.plots.turning import draw_sphere, draw_triads
 from dmoc.scene.attraction import Attraction
+from dmoc.surroundings.view import view_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,6 +88,7 @@ def scenery(solution: MissionSolution) -> Any:
         around = SimpleNamespace(
             effects=effects,
             constraints=_once(one for leg in stretches for one in leg.constraints),
+            links=_once(one for leg in stretches for one in leg.links),
             attraction=Attraction.of(effects, solution.dimension),
             ends=ends_of(solution),
         )

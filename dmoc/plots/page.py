@@ -21,7 +21,7 @@ from dmoc.plots.linked import (
     reaction_units,
 )
 from dmoc.plots.path import draw_path, is_wide
-from dmoc.plots.sheet import arrange, darken, entitle, new_page, new_panels, shade_burns
+from dmoc.plots.sheet import arrange, darkened, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import (
     AXIS_COLOURS,
     AXIS_LINES,
@@ -88,9 +88,7 @@ def save_figure(
         of_kind("solution", solution, Solution)
     if as_path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"cannot draw into {path}: the file must end in {', '.join(SUFFIXES)}")
-    page = figure(solution, report)
-    if dark:
-        darken(page)
+    page = darkened(figure(solution, report), dark)
     with whole_file(path) as temporary:
         page.savefig(temporary, dpi=dpi)
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from dmoc.parts.outline import Ball, Box
 from dmoc.plots.style import DARK, FORBIDDEN, PALE, PATH, PUSH, SETTINGS, readable, within_steps
-from dmoc.plots.surroundings import Corners, draw_scene, outlines, view_of
+from dmoc.plots.surroundings import draw_scene
 from dmoc.plots.turning import draw_triads, paths_of_points
 from dmoc.results.solution import Solution
+from dmoc.surroundings.view import Corners, outlines, view_of
 
 # Step ends are drawn as dots if there are at most this many steps: more would hide the line.
 MOST_DOTS = 40
@@ -30,7 +31,7 @@ HIGHER = 25.0
 # Numbers from this on are long [-]: their signs and digits take the room of two short ones.
 LONG_NUMBER = 1000.0
 # A legend below a panel has room for so many letters, of which each mark with its gaps takes so many.
-LETTERS, MARK = 78, 7
+LETTERS, MARK = 74, 7
 # What the line on the floor of the box is.
 PROJECTION = "projection"
 # Numbers with powers of ten between these two are written without one [-], as in all other panels.
@@ -265,14 +266,17 @@ def legend(axes: Any, proxies: list[Any], beside: bool = False) -> None:
         return
     columns = _columns(labels)
     below = -0.06 if axes.name == "3d" else -0.11
+    if axes.name == "3d" and len(labels) > 2 * columns:
+        # a third row would reach into the line at the foot; in space there is room above
+        below = 0.0
     axes.legend(handles, labels, ncol=columns, loc="upper center", bbox_to_anchor=(0.5, below))
 
 
 def _columns(labels: list[str]) -> int:
     """In how many columns a legend is as wide as its panel at most."""
     for columns in (4, 3):
-        rows = -(-len(labels) // columns)
-        widths = [max(map(len, labels[i : i + rows])) for i in range(0, len(labels), rows)]
+        # matplotlib fills columns so: of 9 entries the first of four has 3, the others 2 each
+        widths = [max(map(len, part)) for part in np.array_split(labels, columns) if len(part)]
         # Three rows would reach into the line below the panels, where two do.
         if sum(widths) + MARK * len(widths) <= LETTERS and not (columns == 4 and 4 < len(labels) <= 6):
             return columns

@@ -35,29 +35,36 @@ ON_DARK = {
     "#009e73": "#35c79c",
     "#b03a00": "#ff9a62",
 }
-# The walls of a box in space on a dark background.
+# The walls of a box in space and the lines on them on a dark background.
 WALL = "#1d2228"
+GRID = "#343b43"
 # What has colours of these kinds is turned dark.
 COLOURED = ("color", "facecolor", "edgecolor", "markerfacecolor", "markeredgecolor")
 
 
-def darken(page: Figure) -> None:
-    """Turn a picture to a dark background."""
-    from matplotlib.colors import to_hex, to_rgba_array
+def darkened(page: Figure, dark: bool = True) -> Figure:
+    """A picture turned to a dark background, if it is to be dark."""
+    if not dark:
+        return page
+    from matplotlib.colors import to_hex, to_rgb, to_rgba_array
 
     for artist in page.findobj():
         for kind in COLOURED:
             if not (hasattr(artist, f"get_{kind}") and hasattr(artist, f"set_{kind}")):
                 continue
             colours = to_rgba_array(getattr(artist, f"get_{kind}")())
-            turned = [to_rgba_array(ON_DARK.get(to_hex(one), to_hex(one)))[0] for one in colours]
-            found = np.array([[*new[:3], old[3]] for new, old in zip(turned, colours, strict=True)])
-            if len(found) and (found != colours).any():
+            turned = [to_rgb(ON_DARK.get(to_hex(one), one)) for one in colours]
+            # What has none of these colours is left alone: surfaces in space tell theirs in the order of depth.
+            if any(to_hex(one) in ON_DARK for one in colours):
+                found = np.concatenate([turned, colours[:, 3:]], axis=1)
                 getattr(artist, f"set_{kind}")(found[0] if len(found) == 1 else found)
     boxes: Any = [axes for axes in page.axes if axes.name == "3d"]
     for box in boxes:
         for axis in (box.xaxis, box.yaxis, box.zaxis):
             axis.set_pane_color(WALL)
+            # in space a grid takes its colour from here when it is drawn
+            axis._axinfo["grid"]["color"] = GRID
+    return page
 
 
 def new_page(dimension: int) -> Figure:

@@ -12,7 +12,8 @@ from dmoc.plots.mission import scenery
 from dmoc.plots.path import extent_of, frame, legend, lies_wide, mark_burns, pushes, scale_of, scaled_arrows
 from dmoc.plots.sheet import arrange, entitle, new_page, new_panels, shade_burns
 from dmoc.plots.style import DARK, LIMIT, PALE, flown_force, readable, speeds, within_steps
-from dmoc.plots.surroundings import draw_scene, view_of
+from dmoc.plots.surroundings import draw_scene
+from dmoc.surroundings.view import view_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

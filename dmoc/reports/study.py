@@ -18,7 +18,7 @@ from dmoc.reports.words import plain_table
 from dmoc.studies.accuracy import TARGETS, Trial, time_to_reach
 
 # Columns of the table of solves that have no value where a solve failed.
-FIGURES = ("error", "goal missed", "iterations", "calls", "build", "solve")
+FIGURES = ("error", "order seen", "goal missed", "iterations", "calls", "build", "solve")
 # Terminals narrower than this [letters] get a table without nodes and calls: with them it would not fit.
 FULL_WIDTH = 92
 
@@ -37,7 +37,28 @@ def study_object(name: str, trials: Sequence[Trial]) -> dict[str, Any]:
         {"method": method, "seconds": dict(zip(map(_power, TARGETS), seconds, strict=True))}
         for method, seconds in time_to_reach(trials).items()
     ]
-    return {"problem": name, "trials": [asdict(trial) for trial in trials], "time_to_reach": reach}
+    orders = observed_orders(trials)
+    rows = [asdict(trial) | {"observed_order": seen} for trial, seen in zip(trials, orders, strict=True)]
+    return {"problem": name, "trials": rows, "time_to_reach": reach}
+
+
+def observed_orders(trials: Sequence[Trial]) -> list[float | None]:
+    """By which power of the steps' length the error of each solve fell since the coarser mesh before it [-].
+
+    None for the first mesh of a method, and where the error did not fall: rounding, or the reference.
+    """
+    found: list[float | None] = []
+    before: Trial | None = None
+    for trial in trials:
+        known = (
+            before is not None and before.method == trial.method and before.status == trial.status == "solved"
+        )
+        if before is not None and known and 0 < trial.error < before.error and trial.steps > before.steps:
+            found.append(math.log(before.error / trial.error) / math.log(trial.steps / before.steps))
+        else:
+            found.append(None)
+        before = trial
+    return found
 
 
 def write_csv(trials: Sequence[Trial], path: Path) -> None:
@@ -49,7 +70,7 @@ def write_csv(trials: Sequence[Trial], path: Path) -> None:
 
 
 def _solves(trials: Sequence[Trial], unit: str, width: int) -> Table:
-    rows = [_cells(trial) for trial in trials]
+    rows = [_cells(trial, seen) for trial, seen in zip(trials, observed_orders(trials), strict=True)]
     names = [name for name in rows[0] if width >= FULL_WIDTH or name not in ("nodes", "calls")] if rows else []
     units = {"objective": unit, "build": "ms", "solve": "ms"}
     heads = [name.replace(" ", "\n") + (f"\n[{units[name]}]" if name in units else "") for name in names]
@@ -62,13 +83,14 @@ def _solves(trials: Sequence[Trial], unit: str, width: int) -> Table:
     return table
 
 
-def _cells(trial: Trial) -> dict[str, str]:
+def _cells(trial: Trial, seen: float | None) -> dict[str, str]:
     cells = {"method": trial.method, "steps": str(trial.steps), "nodes": str(trial.nodes)}
     if trial.status != "solved":
         reason = trial.status.split(":")[0]
         return cells | {"objective": reason} | dict.fromkeys(FIGURES, "-")
     values = (
         f"{trial.error:.1e}",
+        "-" if seen is None else f"{seen:.1f}",
         f"{trial.path_error:.1e}",
         str(trial.iterations),
         str(trial.calls),

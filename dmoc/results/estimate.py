@@ -151,3 +151,10 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
     momenta = np.where(path.coordinates.speeds, scales.speed, spin)
     gap = np.abs(states[1:] - now) / np.concatenate([scales.coordinates, momenta])
     return np.nan_to_num(gap.max(axis=1), nan=1.0, posinf=1.0)
+
+
+def left_after(changes: list[float]) -> float:
+    """The error left after the last change: as much as it, or less where changes fall fast."""
+    last = changes[-1]
+    fall = changes[-2] / last if len(changes) > 1 and last > 0 else 0.0
+    return last / (fall - 1) if fall > 2 else last

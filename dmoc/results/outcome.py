@@ -108,24 +108,26 @@ class Outcome:
         """
         return shown("table")(self)
 
-    def plot(self, path: str | os.PathLike | None = None) -> Any:
+    def plot(self, path: str | os.PathLike | None = None, dark: bool = False) -> Any:
         """The figure of `dmoc plot`: a matplotlib Figure or, with a path, that file.
 
         Parameters
         ----------
         path : path, optional
             Ends in .png, .pdf or .svg; written whole or not at all.
+        dark : bool
+            On a dark background.
 
         Raises
         ------
         ValueError
             If the suffix is another one or the folder does not exist.
         """
-        return shown("plot")(self, path)
+        return shown("plot")(self, path, dark)
 
-    def animate(self, path: str | os.PathLike, frames: int = 80) -> None:
+    def animate(self, path: str | os.PathLike, frames: int = 80, dark: bool = False) -> None:
         """Write a moving picture, .gif or .mp4, as `dmoc.animate` does."""
-        shown("animate")(self, path, frames)
+        shown("animate")(self, path, frames, dark)
 
     def facts(self) -> Any:
         """What users ask of an answer: velocity change, propellant, closest approach, clearance, orbits.

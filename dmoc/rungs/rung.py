@@ -12,6 +12,7 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.ipopt.run import Answer
+from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level, off_optimum
@@ -34,6 +35,9 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
+# A throttle is far from zero if it is everywhere more than this many times the widest rounding of |F| [-]: that
+# changes |F| by 2 % at most.
+FAR = 5.0
 
 
 @dataclass(frozen=True)
@@ -168,6 +172,15 @@ def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem
         return problem
     engine: Any = problem.actuator
     return replace(problem, actuator=replace(engine, smoothing=rounding))
+
+
+def nowhere_zero(path: DiscretePath, problem: TransferProblem) -> bool:
+    """Whether |F| is far from zero all along a path: no wide rounding of it has to lead to the next answer."""
+    engine, used = problem.actuator, path.control[:, -1]
+    if engine.smoothing is None or not used.any():
+        return False
+    most = engine.bounds(problem.dimension)[1][-1]
+    return bool(used.min() > FAR * max(engine.smoothing, WIDEST_ROUNDING) * most)
 
 
 def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Solution:

@@ -18,8 +18,9 @@ from dmoc.sensitivity.worth import conditions_of
 
 # From this part of the time on the gains stay what they are [-]: to meet a fixed goal they grow without bound.
 LAST = 0.9
-# A way to come off the path counts as made good where less than this is left of it [-].
-GONE = 1e-9
+# A way to come off the path counts as made good where less than this is left of it [-]: at a touch of a zone
+# nothing is but rounding.
+GONE = 1e-8
 
 
 def feedback(solution: Any) -> np.ndarray:
@@ -76,21 +77,26 @@ def gains_of(solution: Any, flights: Flights) -> np.ndarray:
         raise ValueError(
             f"feedback needs an actuator whose controls are a force; got {problem.actuator.words()}"
         )
-    moved = _answers(solution, flights)
-    _, along, across = flights.linear
+    moved, mean = _answers(solution, flights)
+    _, along, _, pushed = flights.linear
+    # Momenta count in lengths over the duration.
+    size = np.repeat([1.0, path.duration], flights.axes)
     gains, n = np.zeros((flights.steps, flights.axes, 2 * flights.axes)), flights.axes
     phi = flights.begin_slopes[: 2 * n, : 2 * n]
     for k in range(flights.steps):
         if k and path.mesh[k] > LAST:
             gains[k] = gains[k - 1]
             continue
-        gains[k] = moved[k] @ np.linalg.pinv(phi, rcond=GONE)
-        phi = along[k, : 2 * n, : 2 * n] @ phi + across[k, : 2 * n] @ moved[k]
+        gains[k] = mean[k] / size @ np.linalg.pinv(size[:, None] * phi / size, rcond=GONE) * size
+        phi = along[k, : 2 * n, : 2 * n] @ phi + pushed[k, : 2 * n] @ moved[k]
     return gains
 
 
-def _answers(solution: Any, flights: Flights) -> np.ndarray:
-    """How the mean force of each step moves with position and velocity at the start, (steps, axes, 2 axes)."""
+def _answers(solution: Any, flights: Flights) -> tuple[np.ndarray, np.ndarray]:
+    """How the forces of each step, and their mean, move with position and velocity at the start.
+
+    Of shapes (steps, forces x axes, 2 axes) and (steps, axes, 2 axes).
+    """
     made = conditions_of(solution)
     optimum, n, path = made.optimum, flights.axes, flights.path
     sizes = np.cumsum([0, *(one.value.size for one in optimum.numbers.kept)])
@@ -113,5 +119,7 @@ def _answers(solution: Any, flights: Flights) -> np.ndarray:
     for column in tangent.x.T:
         # The force is linear in the controls.
         force = force_of(dynamics, replace(path, control=group.of(column * optimum.column_scales)))
-        found.append(force if path.hold else np.einsum("j,jkn->kn", rule.weights, force[at]))
-    return np.stack(found, axis=2)
+        found.append(force[None] if path.hold else force[at])
+    each = np.moveaxis(np.stack(found), 0, -1)
+    mean = each[0] if path.hold else np.einsum("j,jknm->knm", rule.weights, each)
+    return each.transpose(1, 0, 2, 3).reshape(flights.steps, -1, 2 * n), mean

@@ -97,10 +97,10 @@ class Flights:
         return len(self.path.mesh) - 1
 
     @cached_property
-    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States at the step ends of the planned path, and each step's slopes by its state and by its noise.
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """States at the step ends of the planned path, and each step's slopes by state, noise and forces.
 
-        Of shapes (steps+1, state), (steps, state, state) and (steps, state, axes).
+        Of shapes (steps+1, state), then (steps, state, ..): state, axes, and forces x axes.
         """
         march, inputs = self._march()
         step, steps, still = self._step(), self.steps, np.zeros((self.axes, self.steps))
@@ -109,10 +109,9 @@ class Flights:
         states[:, 1:] = march(states[:, 0], *inputs, still)[0].full()
         given = [ca.MX.sym(f"w{i}", *step.size_in(i)) for i in range(step.n_in())]
         after = step(*given)[0]
-        both = [ca.densify(ca.jacobian(after, one)) for one in (given[0], given[-1])]
-        found = ca.Function("jacobian", given, both).map(steps)(states[:, :-1], *inputs, still)
-        along, across = (part.full().reshape(self._state, steps, -1).transpose(1, 0, 2) for part in found)
-        return states.T, along, across
+        slopes = [ca.densify(ca.jacobian(after, one)) for one in (given[0], given[-1], given[2])]
+        found = ca.Function("jacobian", given, slopes).map(steps)(states[:, :-1], *inputs, still)
+        return states.T, *(part.full().reshape(self._state, steps, -1).transpose(1, 0, 2) for part in found)
 
     @cached_property
     def begin_slopes(self) -> np.ndarray:
@@ -126,7 +125,7 @@ class Flights:
 
         P <- A P A' + sigma^2 B B' with the Jacobians A and B of each step by its state and by its noise.
         """
-        states, along, across = self.linear
+        states, along, across, _ = self.linear
         found = [np.zeros((self._state, self._state))]
         for a, b in zip(along, across, strict=True):
             found.append(a @ found[-1] @ a.T + sigma**2 * (b @ b.T))
@@ -138,7 +137,7 @@ class Flights:
 
         The product of the Jacobians of all steps up to there, each at the planned path.
         """
-        states, along, _ = self.linear
+        states, along, *_ = self.linear
         # S_(k+1) = A_k S_k, as P_(k+1) = A_k P_k A_k' for the covariance of a state that holds the errors too.
         found = [self.begin_slopes]
         for a in along:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
+from dmoc.configurations.acting import state_symbols
 from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
+from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
 from dmoc.rungs.rung import HELD, Rung, let_go, rounded
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import WIDER, Ladder
-from dmoc.solver.meshes import WIDEST_ROUNDING, rounding_stages
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest
 # thrust, and the path of least effort no more than this part of that thrust [-]: where it takes more, least
@@ -39,8 +41,6 @@ def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
     five iterations each time and lies a thousandth above its optimum.
     """
     problem = ladder.problem
-    if not _may_be_flat(problem) or first.multipliers:
-        return None
     widths = [width for _, width in rounding_stages([first.mesh], problem.actuator.smoothing)]
     wide = None if widths[0] is None else max(WIDEST_ROUNDING, widths[0])
     effort = replace(rounded(problem, wide), objective=Effort())
@@ -58,6 +58,8 @@ def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
 
 def flat_optimum(ladder: Ladder, first: DiscretePath, tolerance: float | None = None) -> Rung | None:
     """An optimum on the mesh of a guess by way of two burns or of the path of least effort, or None."""
+    if first.multipliers or not _may_be_flat(ladder.problem):
+        return None
     for held in (held_near_two_burns, held_near_least_effort):
         rung = held(ladder, first)
         if rung is not None and rung.solved:
@@ -72,8 +74,6 @@ def held_near_two_burns(ladder: Ladder, first: DiscretePath) -> Rung | None:
 
     From the path of least effort, with thrust all along, most attempts lead nowhere on the way to few burns.
     """
-    if not _may_be_flat(ladder.problem) or first.multipliers:
-        return None
     path = two_burns(ladder.problem, first)
     if path is None:
         return None
@@ -91,9 +91,17 @@ def _may_be_flat(problem: TransferProblem) -> bool:
     limit, duration = problem.actuator.force_limit(), problem.duration_bounds[0]
     open_place = not (problem.start.anchored and problem.goal.anchored)
     between_orbits = problem.attraction.lone is not None and open_place and not problem.free_duration
-    if not between_orbits or limit is None or problem.constraints or not has_linear_controls(problem):
+    if not between_orbits or limit is None or problem.constraints:
+        return False
+    if _aims_at_a_place(problem) or not has_linear_controls(problem):
         return False
     ends = end_estimates(problem, duration)
     if not np.isfinite(ends).all():
         return False
     return problem.mass * velocity_change_between(problem, ends) < TO_SPARE * limit * duration
+
+
+def _aims_at_a_place(problem: TransferProblem) -> bool:
+    """Whether the objective is one of the place or velocity at the goal: it takes all the thrust there is."""
+    t, q, v, m = state_symbols(problem.dimension)
+    return bool(ca.depends_on(ca.SX(problem.objective.terminal(t, q, v, m)), ca.vertcat(q, v)))

@@ -15,6 +15,7 @@ from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_row
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import STATUSES, Interrupt
+from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
@@ -23,10 +24,9 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
-from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, rounded
+from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded
 from dmoc.rungs.tube import around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import coarse_to_fine, rounding_stages
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
@@ -62,10 +62,8 @@ class Ladder:
         # Whether a problem that a message names has an answer, if somebody can say.
         self.holds: Callable[[TransferProblem], bool] | None = None
         self.patient = True  # a finer mesh is tried where a coarse one has no path
-        self.rungs: list[Rung] = []  # all attempts so far
-        self._levels: list[Level] = []
-        # Takes attempts that were made elsewhere.
-        self.tell = self._levels.append
+        self.rungs, self._levels = list[Rung](), list[Level]()  # all attempts so far
+        self.tell = self._levels.append  # takes attempts that were made elsewhere
 
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
         """The answer on the mesh of a first guess, by way of coarser meshes unless it has multipliers.
@@ -84,7 +82,9 @@ class Ladder:
         cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
         stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
-        for mesh, rounding in stages:
+        for (mesh, rounding), (following, _) in zip(stages, [*stages[1:], (None, None)], strict=True):
+            if mesh is following and nowhere_zero(known, self.problem):
+                continue
             this = first.order if mesh is first.mesh else order
             start, again = known.onto(mesh, this, first.hold), first.onto(mesh, this, first.hold)
             rung = self._solved_or_explained(start, again, rounding, cause, mesh is first.mesh)
@@ -251,14 +251,14 @@ class Ladder:
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
         units = units_of(problem, guess)
         nlp = transcribe_onto(problem, guess, units, self.compiled, chart_of(problem, guess, units.origin))
-        # Later attempts start from answers, where all rows have values.
-        if last is None:
-            refuse_undefined_rows(nlp, problem, guess)
         watch = nlp.watch(problem, self.progress, self.interrupt)
         asked_of = nlp.leaning(guess, lean) if lean else nlp
         solver = asked_of.solver(self.options, bool(guess.multipliers), carried, watch, limits)
         built = time.perf_counter() - begun
         answer = asked_of.run(solver, problem, guess, pinned)
+        # Later attempts start from answers, where all rows have values.
+        if last is None and answer.status == "invalid number":
+            refuse_undefined_rows(nlp, problem, guess)
         if lean:
             true = float(nlp.assembly.objective(answer.x, nlp.parameters(problem)))
             answer = replace(answer, objective=true)

@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
+from dmoc.meshes.choices import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
 from dmoc.motion.flown import flown
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath
@@ -19,7 +20,6 @@ from dmoc.results.between import Cut, cuts
 from dmoc.results.flown_cost import unpriced
 from dmoc.rungs.rung import Rung
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
-from dmoc.solver.meshes import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
 
 # At most this many ways past the zones are tried, the shortest first: two sides of four zones.
 MOST_WAYS = 8

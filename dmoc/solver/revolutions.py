@@ -11,6 +11,7 @@ from dmoc.basics.digits import lasting
 from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
 from dmoc.guess.starting import guess_duration, starting_guess
+from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -21,7 +22,6 @@ from dmoc.rungs.rung import Rung
 from dmoc.rungs.tube import led
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 
 # Durations are tried at least so close to each other, in revolutions: two optima are about one apart.
 SPACING = 0.5

@@ -11,6 +11,7 @@ import numpy as np
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import OTHER_TURNS, change_without_phase, end_estimates, with_more_turns
 from dmoc.guess.starting import angle_around, starting_guess
+from dmoc.meshes.choices import COARSEST_NODES, first_path, least_steps
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights, uniform_mesh
@@ -22,7 +23,6 @@ from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import NEAR, goal_missed
-from dmoc.solver.meshes import COARSEST_NODES, first_path, least_steps
 from dmoc.solver.revolutions import Sounding, promise, solved_from
 
 # In a fixed time another number of revolutions may be better if a path takes more than this many times the

@@ -8,6 +8,7 @@ from typing import Any
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
 from dmoc.diagnosis.wrong_way import STUCK, in_two_pieces, turned_round
+from dmoc.meshes.choices import first_path, followed
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import Progress
@@ -17,7 +18,6 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
-from dmoc.solver.meshes import first_path, followed
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.second_look import cheaper_revolutions

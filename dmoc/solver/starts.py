@@ -14,14 +14,7 @@ from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import OTHER_TURNS, with_more_turns
 from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import angle_around, starting_guess
-from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import path_scales
-from dmoc.nlp.transcription import check_mesh
-from dmoc.results.solution import Solution
-from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import Ladder
-from dmoc.solver.mended import is_flyable
-from dmoc.solver.meshes import (
+from dmoc.meshes.choices import (
     COARSEST_NODES,
     WIDEST_ROUNDING,
     coarse_to_fine,
@@ -29,6 +22,13 @@ from dmoc.solver.meshes import (
     followed,
     least_steps,
 )
+from dmoc.motion.path import DiscretePath
+from dmoc.motion.scales import path_scales
+from dmoc.nlp.transcription import check_mesh
+from dmoc.results.solution import Solution
+from dmoc.scene.problem import TransferProblem
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.mended import is_flyable
 
 # Two answers can be one optimum only if the relative difference of their objectives is at most this [-].
 SAME_OBJECTIVE = 1e-4

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import STATUSES
+from dmoc.meshes.choices import TRIAL_ORDER, best_order, trial_path, with_as_many_nodes
+from dmoc.meshes.cuts import PARTS, SHORTEST, cut, cuts_of
+from dmoc.meshes.smooth import finer, smooth_path
 from dmoc.motion.path import DiscretePath
 from dmoc.results.estimate import (
     LEAST_FALL,
@@ -28,17 +30,14 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
-from dmoc.solver.meshes import TRIAL_ORDER, best_order, order_of_smooth, trial_path, with_as_many_nodes
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
 MOST_NODES = 200_000
+# A smooth transfer is solved on so many meshes, each as fine as the error of the one before asks for.
+MOST_AT_ONCE = 2
 # Refinement ends after this many meshes: steps at a switch have then come down to the shortest.
 MOST_MESHES = 14
-# A step in which the control jumps is cut into this many parts.
-PARTS = 4
-# No step becomes shorter than this part of the duration.
-SHORTEST = 1e-5
 # The rounding of |F| may cost this part of the tolerance.
 ROUNDING_SHARE = 0.5
 # An attempt with |F| rounded less is given up after this many iterations: it takes 20 to 100 or leads nowhere.
@@ -82,12 +81,13 @@ def climb_to_tolerance(
     limits it may be the answer. All step ends are kept from mesh to mesh: the answer on one is a good start for
     the next, and the change there tells the error.
     """
-    first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
     smooth = not (ladder.problem.limited or hold)
-    if smooth and order is None:
+    if smooth and order is None and steps is None:
         # Nothing can switch, so that no trial is needed.
-        order = order_of_smooth(tol)
-        first = starting_guess(ladder.problem, with_as_many_nodes(first, order), order, hold, guess)
+        first = smooth_path(ladder.problem, tol, guess)
+        order = first.order
+    else:
+        first = trial_path(ladder.problem, order or TRIAL_ORDER, steps, hold, guess)
     trial = flat_optimum(ladder, first, tol)
     if trial is None:
         trial, first = on_shorter_steps(ladder, ladder.climb_to(first, guess), first, guess)
@@ -108,8 +108,14 @@ def climb_to_tolerance(
             return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
     refinement = _Refinement(ladder, tol, local, reason)
-    if smooth and refinement.meets_at_once(trial):
-        return refinement.settled(reason)
+    for _ in range(MOST_AT_ONCE if smooth else 0):
+        if refinement.meets_at_once(trial):
+            return refinement.settled(reason)
+        mesh = finer(trial.path, refinement.errors[trial.number], tol)
+        again = ladder.solve_on(trial.path.onto(mesh, order, hold))
+        if not again.solved:
+            break
+        trial = again
     return refinement.of(trial, order, hold)
 
 
@@ -141,7 +147,7 @@ class _Refinement:
         while True:
             coarse, cost = rung.path, rung.level.objective
             parts, most = self._cuts(coarse, cost, longest)
-            rung = self._refined(coarse.onto(_cut(coarse.mesh, parts), order, hold))
+            rung = self._refined(coarse.onto(cut(coarse.mesh, parts), order, hold))
             if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
                     return self.ladder.solution(rung, self.errors, tolerance=self.tol)
@@ -205,7 +211,7 @@ class _Refinement:
         most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
         fall = max(self.changes[-2]) / max(*self.changes[-1], TINY) if len(self.changes) > 1 else np.inf
         slow = fall < SLOW and self.changes[-1][1] > self.changes[-1][0]
-        return _cuts_of(path, errors, places, wanted, 2 if slow else 1), most
+        return cuts_of(path, errors, places, wanted, 2 if slow else 1), most
 
     def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
         """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
@@ -265,32 +271,6 @@ class _Refinement:
             return solution
         told = f"the estimated error is {reached:.1e}, you asked for {self.tol:g}; {STATUSES[NOT_MET].advice}"
         return replace(solution, success=False, status=NOT_MET, message=told)
-
-
-def _cuts_of(
-    path: DiscretePath, errors: np.ndarray, corners: np.ndarray, shortest: float, least: int
-) -> np.ndarray:
-    """Into how many parts to cut each step.
-
-    A step is cut in two or, if it is one of those that together make little of the local errors, into `least`.
-    At corners it is cut into as many parts as lead to the shortest step wanted there, since the error falls
-    only with the length of that step.
-    """
-    parts, order = np.full(len(errors), 2), np.argsort(errors)
-    # Cutting all steps in two leaves 2^-order of the errors: steps that together make half of that can wait.
-    small = np.cumsum(errors[order]) <= 0.5 * 2.0**-path.order * errors.sum()
-    parts[order[small]] = least
-    for k in corners:
-        near = slice(max(k - 1, 0), k + 2)
-        wanted = np.round(np.diff(path.mesh)[near] / shortest).astype(int)
-        parts[near] = np.clip(wanted, 1, PARTS)
-    parts[np.diff(path.mesh) < 2 * SHORTEST] = 1
-    return parts
-
-
-def _cut(mesh: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(mesh[:-1], mesh[1:], parts, strict=True)]
-    return np.append(np.concatenate(pieces), mesh[-1])
 
 
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:

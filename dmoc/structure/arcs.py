@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from dmoc.results.solution import Solution
 from dmoc.results.switches import control_shares
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.modes import FREE, INSIDE, SINGULAR_NODES, kinds_along, names_of, runs_of, switch
+from dmoc.structure.speeds import sped
 from dmoc.structure.surfaces import Surface, touched
 
 # What the controls do in an arc.
@@ -20,6 +21,8 @@ BURN, COAST, SINGULAR = "burn", "coast", "singular arc"
 ACTS = 1e-5
 # A path follows a limit if that acts over more than this many steps; else it touches it.
 FOLLOWED_STEPS = 2.5
+# A switch within so many steps from where a limit on the speed is reached or left is there.
+BESIDE = 2.0
 
 
 class Arc(NamedTuple):
@@ -55,9 +58,22 @@ def arcs_of(solution: Solution) -> tuple[Arc, ...]:
     problem, path = solution.require_problem(), solution.path
     cuts = _switches(problem, path) if is_switched(problem) else _limits_kept(solution)
     marks: list[tuple[float, float, Surface]] = []
-    for surface, acts in touched(problem, path, ACTS * abs(solution.objective)).items():
+    least, step = ACTS * abs(solution.objective), 1.0 / (len(path.mesh) - 1)
+    for surface, acts in touched(problem, path, least).items():
         marks += [(*span, surface) for span in spans_of(path, acts)]
-    return _merged(cuts, sorted(marks), 1.0 / (len(path.mesh) - 1))
+    kept = sped(problem, path, least)
+    along = [(*span, surface) for surface, acts in kept.items() for span in spans_of(path, acts)]
+    return _merged(_beside(cuts, along, step), sorted([*marks, *along]), step, kept)
+
+
+def _beside(cuts: list, along: list[tuple[float, float, Surface]], step: float) -> list[tuple[str, float]]:
+    """Switches; those next to where a limit on the speed is reached or left are there."""
+    ends = np.array([end for first, last, _ in along for end in (first, last)])
+    found = []
+    for kind, end in cuts:
+        near = ends[np.abs(ends - end) < BESIDE * step]
+        found.append((kind, float(near[0]) if len(near) and end < 1.0 else end))
+    return found
 
 
 def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, float]]:
@@ -92,6 +108,34 @@ def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
     return [*found, (str(kinds[-1]), 1.0)]
 
 
+def surely_seen(arcs: tuple[Arc, ...], solution: Solution) -> tuple[Arc, ...]:
+    """The arcs without those, but for the first and the last one, that are shorter than from node to node.
+
+    They may be none; those that are missing then are found by the switching function.
+    """
+    left, spacing = list(arcs), 1.0 / (len(solution.path.fractions) - 1)
+    while len(left) > 2:
+        lengths = np.diff([arc.end for arc in left[:-1]])
+        place = int(np.argmin(lengths))
+        if lengths[place] >= spacing:
+            break
+        before, short = left[place], left.pop(place + 1)
+        left[place] = before._replace(end=short.end, touches=before.touches or short.touches)
+        left = list(joined(left))
+    return tuple(left)
+
+
+def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
+    """Neighbours that are alike, and have no touch between them, are one arc."""
+    left: list[Arc] = []
+    for arc in arcs:
+        if left and left[-1].alike == arc.alike and left[-1].touches in (None, arc.follows):
+            left[-1] = arc
+        else:
+            left.append(arc)
+    return tuple(left)
+
+
 def spans_of(path: DiscretePath, acts: np.ndarray) -> list[tuple[float, float]]:
     """First and last fraction of each run of nodes; gaps within a step do not part a run."""
     at, steps = path.fractions, path.order // 2
@@ -100,19 +144,27 @@ def spans_of(path: DiscretePath, acts: np.ndarray) -> list[tuple[float, float]]:
     return [(float(at[run[0]]), float(at[run[-1]])) for run in runs]
 
 
-def _merged(cuts: list, marks: list[tuple[float, float, Surface]], step: float) -> tuple[Arc, ...]:
-    """Arcs between all switches, touches, and begins and ends of ways along limits."""
+def _merged(
+    cuts: list, marks: list[tuple[float, float, Surface]], step: float, kept: Container[Surface] = ()
+) -> tuple[Arc, ...]:
+    """Arcs between all switches, touches, and begins and ends of ways along limits.
+
+    Those that are `kept` are never touched at one instant alone.
+    """
     places: list[tuple[float, Surface | None]] = [(end, None) for _, end in cuts]
     follows: list[tuple[float, float, Surface]] = []
     for first, last, surface in marks:
         # Nothing keeps a coast at a limit: what looks like that is a touch.
-        if last - first > FOLLOWED_STEPS * step and COAST not in _kinds_within(cuts, first, last):
+        long = last - first > FOLLOWED_STEPS * step and COAST not in _kinds_within(cuts, first, last)
+        if long or surface in kept:
             follows.append((first, last, surface))
             places += [(first, surface), (last, surface)]
         else:
             places.append((0.5 * (first + last), surface))
     arcs, begin = [], 0.0
-    for end, touch in sorted(places, key=lambda place: place[0]):
+    for end, touch in sorted(places, key=lambda place: (place[0], place[1] is None)):
+        if end <= begin:
+            continue
         middle = 0.5 * (begin + end)
         kind = next(kind for kind, last in cuts if middle <= last)
         along = next((one for first, last, one in follows if first <= middle <= last), None)

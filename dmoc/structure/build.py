@@ -20,6 +20,7 @@ from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
 from dmoc.structure.modes import are_rows, continued, controls_at_limits, is_linear, names_of, sides_of
+from dmoc.structure.speeds import held, is_of_speed
 from dmoc.structure.surfaces import Followed, Tangent
 
 # Legs are found with this order: from a rough path Ipopt gets there far more often than at order 6 or 8.
@@ -41,7 +42,9 @@ def mission_of(problem: TransferProblem, arcs: Sequence[Arc]) -> Mission:
     parts: list[Any] = []
     for i, arc in enumerate(arcs):
         parts.append(_leg(problem, arc, i))
-        if arc.touches is not None:
+        if is_of_speed(problem, arc.touches):
+            parts += held(problem)
+        elif arc.touches is not None:
             parts.append(Tangent(problem.constraints[arc.touches.constraint], arc.touches))
         elif i + 1 < len(arcs):
             parts += continued(problem, arc.kind, arcs[i + 1].kind)
@@ -77,7 +80,8 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
     degree = SINGULAR_DEGREE if arc.kind == SINGULAR else None
     sides = sides_of(problem, arc.kind)
     kept = problem.actuator.kept(sides) if any(sides) else None
-    if names_of(problem) and not are_rows(problem) and (is_linear(problem) & (np.array(sides) == 0)).any():
+    linear = names_of(problem) and not is_of_speed(problem, arc.follows)
+    if linear and not are_rows(problem) and (is_linear(problem) & (np.array(sides) == 0)).any():
         degree = SINGULAR_DEGREE
     return Leg(constraints=constraints, name=name, actuator=kept, control_degree=degree)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, spans_of
+from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, joined, spans_of
 from dmoc.structure.modes import lacking, names_of
+from dmoc.structure.speeds import is_of_speed, sped
 from dmoc.structure.surfaces import NEAR, pierced, room, touched
 
 # A leg is empty if it lasts less than this many times its shortest duration.
@@ -91,7 +92,8 @@ def without_empty(arcs: tuple[Arc, ...], found: MissionSolution) -> tuple[Arc, .
     for arc, drop in zip(arcs, empty, strict=True):
         if drop and left:
             touches = arc.follows or arc.touches or left[-1].touches
-            left[-1] = left[-1]._replace(end=arc.end, touches=touches)
+            in_vain = is_of_speed(found.require_problem(), arc.follows)
+            left[-1] = left[-1]._replace(end=arc.end, touches=None if in_vain else touches)
         elif not drop:
             left.append(arc)
     return joined(left)
@@ -102,6 +104,8 @@ def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSol
     left = list(arcs)
     for i, (one, two) in enumerate(pairwise(arcs)):
         surface = one.touches
+        if is_of_speed(problem, surface):
+            continue
         if surface is not None and surface == two.touches and two.follows is None:
             rooms = [
                 room(problem, leg.path, surface, leg.path.fractions, leg.path.position) for leg in found.legs
@@ -118,17 +122,6 @@ def _followed(problem: TransferProblem, arcs: tuple[Arc, ...], found: MissionSol
         one._replace(touches=None) if one.follows and one.alike == two.alike else one
         for one, two in zip(left, [*left[1:], left[-1]._replace(kind="")], strict=True)
     )
-
-
-def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
-    """Neighbours that are alike, and have no touch between them, are one arc."""
-    left: list[Arc] = []
-    for arc in arcs:
-        if left and left[-1].alike == arc.alike and left[-1].touches is None:
-            left[-1] = arc
-        else:
-            left.append(arc)
-    return tuple(left)
 
 
 def _wrong(arcs: tuple[Arc, ...], index: int, leg: Solution) -> np.ndarray:
@@ -179,6 +172,12 @@ def _touching(problem: TransferProblem, arc: Arc, leg: Solution, objective: floa
     ]
     marks = marks or pierced(problem, leg.path, leg.provenance.start_time)
     marks = [mark for mark in marks if mark[1] != arc.follows]
+    for surface, mask in sped(problem, leg.path, ACTS * abs(objective)).items():
+        if surface != arc.follows:
+            first, last = spans_of(leg.path, mask)[0]
+            begun = [arc._replace(end=first, touches=surface)] if first > 0 else []
+            kept = arc._replace(end=last, follows=surface, touches=surface if last < 1 else arc.touches)
+            return [*begun, kept, *([arc] if last < 1 else [])]
     if not marks:
         return []
     return [*(arc._replace(end=at, touches=surface) for at, surface in sorted(marks)), arc._replace(end=1.0)]

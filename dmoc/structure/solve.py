@@ -12,22 +12,23 @@ from dmoc.basics.digits import lasting
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
 from dmoc.guess.starting import angle_around
+from dmoc.meshes.choices import first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.meshes import first_path
 from dmoc.solver.solve import check_numerics, solve
-from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain
+from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
-# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer.
-ROUNDED = 1e-3
+# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, and in the second one:
+# where the fuel hardly depends on where it burns, a wide rounding hides short burns.
+ROUNDED, LESS_ROUNDED = 1e-3, 1e-4
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
 COARSE_STEPS = {2: 60, 4: 30}
 # A second coarse answer has so many times the steps.
@@ -46,8 +47,9 @@ MOST_ROUNDS = 10
 NEAR = (1e-9, 1e-6), (1e-4, 1e-2)
 # An answer that costs more than the coarse one by over this part of it [-] is another optimum, or none.
 WORSE = 0.1
-# An attempt from nearly the answer ends after this many iterations.
-MOST_ITERATIONS = 100
+# An attempt from nearly the answer ends after this many iterations, on arcs of a second coarse answer after
+# that many.
+MOST_ITERATIONS, PATIENT = 100, 250
 # Finding the legs takes at most this much work, iterations times steps, beside so many times that of the coarse
 # answer: about two seconds. Where they are not found by then the ordinary ladder goes on.
 MOST_WORK, MOST_TIMES = 20_000, 2
@@ -84,10 +86,10 @@ def solve_by_structure(
         if len(arcs_of(coarse)) == 1:
             return found
         # Where a burn is hardly longer than a step the arcs are seen on a finer mesh.
-        finer = coarse_answer(problem, coarse.order, FINER * coarse.steps, **more)
+        finer = coarse_answer(problem, coarse.order, FINER * coarse.steps, LESS_ROUNDED, **more)
         if finer.status in ENDED:
             return finer
-        found = (_by_arcs(problem, finer, tol, more) if finer.success else None) or found
+        found = (_by_arcs(problem, finer, tol, more, PATIENT) if finer.success else None) or found
     if found is None or not _is_dear(found, coarse):
         return found
     return None if otherwise is None else _better(found, otherwise())
@@ -106,10 +108,16 @@ def _better(found: MissionSolution, other: Solution) -> MissionSolution | Soluti
 
 
 def _by_arcs(
-    problem: TransferProblem, coarse: Solution, tol: float | None, more: dict[str, Any]
+    problem: TransferProblem,
+    coarse: Solution,
+    tol: float | None,
+    more: dict[str, Any],
+    most: int = MOST_ITERATIONS,
 ) -> MissionSolution | None:
-    """The answer as a mission of the arcs of a coarse one."""
+    """The answer as a mission of the arcs of a coarse one; an attempt ends after `most` iterations."""
     arcs, legs = arcs_of(coarse), (coarse,)
+    if most > MOST_ITERATIONS:
+        arcs = surely_seen(arcs, coarse)
     if len(arcs) == 1 and arcs[0].alike == (FREE, None):
         return None
     numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
@@ -117,27 +125,31 @@ def _by_arcs(
     climb.sharp = True
     climb.levels.extend(coarse.ladder)
     with climb.interrupt:
-        found = _improved(climb, problem, arcs, legs, tol)
+        found = _improved(climb, problem, arcs, legs, tol, most)
     if found is None or found.status in ENDED:
         return found
-    return found if found.optimal and _is_settled(found) and verdict(found).ok else None
+    return found if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok else None
 
 
-def _is_settled(found: MissionSolution) -> bool:
-    """Whether the last two meshes of one order agree on the objective, unless the tolerance has been met."""
+def _is_settled(found: MissionSolution, coarse: int) -> bool:
+    """Whether the last two meshes of one order agree on the objective, unless the tolerance has been met.
+
+    The first `coarse` levels of the ladder are those of the coarse answer.
+    """
     last = found.ladder[-1]
-    same = [level for level in found.ladder if level.order == last.order and level.status == "solved"]
+    same = [level for level in found.ladder[coarse:] if level.order == last.order and level.status == "solved"]
     if found.tolerance is not None or len(same) < 2 or last.order == FOUND_ORDER:
         return True
     return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)
 
 
 def can_be_parted(problem: TransferProblem) -> bool:
-    """Whether arcs can be seen: of one body that does not turn, whose limits are on its place or its force."""
+    """Whether arcs can be seen: of one body that does not turn, without a limit on speed where it coasts."""
     return not (
         problem.turns
         or problem.links
-        or any(part.limits_speed or part.turns_body or part.point for part in problem.constraints)
+        or any(part.turns_body or part.point for part in problem.constraints)
+        or (is_switched(problem) and any(part.limits_speed for part in problem.constraints))
         or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
     )
 
@@ -147,11 +159,13 @@ def has_switches(problem: TransferProblem) -> bool:
     return (bool(problem.constraints) or is_switched(problem)) and can_be_parted(problem)
 
 
-def coarse_answer(problem: TransferProblem, order: int | None, steps: int | None, **more: Any) -> Solution:
-    """An answer that is good enough to see the arcs in."""
+def coarse_answer(
+    problem: TransferProblem, order: int | None, steps: int | None, rounded: float = ROUNDED, **more: Any
+) -> Solution:
+    """An answer that is good enough to see the arcs in, |F| `rounded` at zero over that part of its limit."""
     engine: Any = problem.actuator
-    if engine.smoothing is not None and engine.smoothing < ROUNDED:
-        problem = replace(problem, actuator=replace(engine, smoothing=ROUNDED))
+    if engine.smoothing is not None and engine.smoothing < rounded:
+        problem = replace(problem, actuator=replace(engine, smoothing=rounded))
     if order is None and steps is None:
         wanted = first_path(problem, guess=more.get("guess"))
         order, steps = wanted.order, len(wanted.mesh) - 1
@@ -174,13 +188,18 @@ def verdict(found: MissionSolution) -> Report:
 
 
 def _improved(
-    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution], tol: float | None
+    climb: Climb,
+    problem: TransferProblem,
+    arcs: tuple[Arc, ...],
+    legs: Sequence[Solution],
+    tol: float | None,
+    iterations: int,
 ) -> MissionSolution | None:
     """The arcs of an answer on fine meshes, once no mesh shows that one is missing or in vain."""
     spent = _work(climb)
     most = MOST_WORK + MOST_TIMES * spent
     for _ in range(MOST_ROUNDS):
-        settled = _settled(climb, problem, arcs, legs, spent + most)
+        settled = _settled(climb, problem, arcs, legs, (spent + most, iterations))
         if settled is None:
             return None
         known, attempt = settled
@@ -203,18 +222,27 @@ def _work(climb: Climb) -> int:
 
 
 def _settled(
-    climb: Climb, problem: TransferProblem, arcs: tuple[Arc, ...], legs: Sequence[Solution], most: int
+    climb: Climb,
+    problem: TransferProblem,
+    arcs: tuple[Arc, ...],
+    legs: Sequence[Solution],
+    most: tuple[int, int],
 ) -> tuple[tuple[Arc, ...], Attempt] | None:
-    """The arcs that neither lack one nor have one in vain, and their answer, within so much work."""
+    """The arcs that neither lack one nor have one in vain, and their answer.
+
+    `most` is how much work there may be at all, and after how many iterations an attempt ends.
+    """
     for _ in range(MOST_ROUNDS):
         climb.mission = mission_of(problem, arcs)
         path = path_of(problem, arcs, legs)
         for near in NEAR:
-            if _work(climb) > most:
+            if _work(climb) > most[0]:
                 return None
-            attempt = climb.attempt(path, most=MOST_ITERATIONS, near=near)
+            attempt = climb.attempt(path, most=most[1], near=near)
             if attempt.solved or attempt.answer.status == "stopped":
                 break
+        if attempt.solved and attempt.level.iterations > MOST_ITERATIONS:
+            climb.valley = NEAR[0]
         if attempt.answer.status == "stopped":
             return arcs, attempt
         if not attempt.solved:
@@ -235,5 +263,5 @@ def _of_high_order(climb: Climb, problem: TransferProblem, attempt: Attempt, tol
     path = attempt.path
     spans = [(begin, begin + leg.duration) for begin, leg in zip(path.begins, path.legs, strict=True)]
     onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
-    finer = climb.attempt(onto, carried=True, most=2 * MOST_ITERATIONS)
+    finer = climb.on_finer(onto, most=2 * MOST_ITERATIONS)
     return finer if finer.solved else attempt

@@ -188,14 +188,22 @@ class Followed(Constraint):
 
     def rows_of(self, t: Any, body: Body, u: Any, m: Any) -> list[Row]:
         rows = list(self.base.rows_of(t, body, u, m))
+        return rows if self.limits_speed else self._kept(rows)
+
+    def speed_rows_of(self, body: Body) -> list[Row]:
+        rows = list(self.base.speed_rows_of(body))
+        return self._kept(rows) if self.limits_speed else rows
+
+    def _kept(self, rows: list[Row]) -> list[Row]:
+        """Rows of which that of the limit is an equation."""
         place = self.surface.row
         if place >= 0:
             value = rows[place].upper if self.surface.upper else rows[place].lower
             rows[place] = rows[place]._replace(lower=value, upper=value)
         return rows
 
-    def speed_rows_of(self, body: Body) -> list[Row]:
-        return self.base.speed_rows_of(body)
+    def largest_speed(self) -> float | None:
+        return self.base.largest_speed()
 
     def bounds(self, dimension: int) -> tuple[np.ndarray, np.ndarray]:
         lower, upper = (np.array(side, float) for side in self.base.bounds(dimension))

@@ -15,6 +15,7 @@ import numpy as np
 from dmoc.basics.arguments import number
 from dmoc.basics.memory import forget
 from dmoc.guess.starting import starting_guess
+from dmoc.meshes.choices import guess_on
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
@@ -26,7 +27,6 @@ from dmoc.nlp.transcription import check_mesh
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import guess_on
 from dmoc.solver.solve import solve
 from dmoc.studies.other_methods import Formulation as Formulation
 from dmoc.studies.other_methods import Method, Run, counted, solve_other

@@ -11,8 +11,8 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.chains.path import MissionPath
 from dmoc.guess.open_ends import turned_around
-from dmoc.legs.legs import Leg
 from dmoc.missions.climb import OTHER_DURATIONS, Climb
+from dmoc.missions.drops import timed
 from dmoc.missions.guess import first_path, likely_durations
 from dmoc.scene.mission import Mission
 from dmoc.solver.starts import SAME_OBJECTIVE, Optimum
@@ -68,7 +68,7 @@ def _variants(mission: Mission, order: int | None, hold: bool, guess: Any) -> It
     yield "default", base
 
     def at(start: float, durations: np.ndarray) -> MissionPath:
-        return first_path(_timed(mission, start, durations), order, None, hold, None)
+        return first_path(timed(mission, start, durations), order, None, hold, None)
 
     usual, begin = likely_durations(mission), base.begins[0]
     families = [
@@ -122,13 +122,3 @@ def _drawn(mission: Mission, at: Any) -> Iterator[tuple[str, MissionPath]]:
         number += 1
         start = draw.uniform(*mission.start_bounds)
         yield f"draw {number}", at(start, np.exp(draw.uniform(logs[:, 0], logs[:, 1])))
-
-
-def _timed(mission: Mission, start: float, durations: np.ndarray) -> Mission:
-    """A mission that begins at a time, and whose legs last given times within their bounds."""
-    spans = iter(
-        float(np.clip(duration, *leg.duration_bounds))
-        for duration, leg in zip(durations, mission.stretches, strict=True)
-    )
-    legs = [replace(part, duration=next(spans)) if isinstance(part, Leg) else part for part in mission.legs]
-    return replace(mission, legs=legs, duration=None, start_time=start)

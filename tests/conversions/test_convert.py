@@ -15,7 +15,9 @@ import pytest
 from dmoc import (
     Coast,
     DeltaV,
+    Engine,
     Impulse,
+    Leg,
     Mission,
     Moving,
     PointGravity,
@@ -23,9 +25,11 @@ from dmoc import (
     TransferProblem,
     convert,
     load,
+    simulate,
     solve,
 )
 from dmoc.cli.app import main
+from dmoc.conversions.marched import marched_columns, write_marched
 from dmoc.planets.dates import utc_of
 from dmoc.scene.problem_file import load_problem
 
@@ -130,6 +134,31 @@ def test_a_table_has_every_node(transfer, tmp_path):
         assert next(csv.DictReader(file))["date (UTC)"] == "2028-11-20T00:04:10"
 
 
+def test_a_leg_without_a_column_has_empty_cells(tmp_path):
+    """An engine has a throttle, a free force has none."""
+    ends = State((0, 0), (0, 0)), State((1, 0), (1, 0))
+    mixed = Mission(1.0, *ends, [Leg(1.0, actuator=Engine(9.0)), Leg(1.0)])
+    convert(solve(mixed, order=2, steps=4), tmp_path / "path.csv")
+    with (tmp_path / "path.csv").open(newline="") as file:
+        throttles = [row["control throttle [N]"] for row in csv.DictReader(file)]
+    assert throttles[5:] == [""] * 5 and all(np.isfinite([float(cell) for cell in throttles[:5]]))
+
+
+def test_a_marched_path_is_a_table(turning, tmp_path):
+    """Of a body that turns, by the torques of an answer."""
+    marched = simulate(turning.problem, turning)
+    columns = marched_columns(marched, turning.problem)
+    turns = np.stack([columns[f"rate {axis} [rad/s]"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(turns, turning.rate, atol=1e-9)
+    quaternions = [values for name, values in columns.items() if name.startswith("attitude")]
+    np.testing.assert_allclose(np.transpose(quaternions)[-1], turning.attitude[-1], atol=1e-9)
+    write_marched(marched, turning.problem, tmp_path / "marched.csv")
+    with (tmp_path / "marched.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["rate z [rad/s]"]) for row in rows] == columns["rate z [rad/s]"].tolist()
+    assert set(rows[0]) == set(columns) and {"time [s]", "mass [kg]", "energy [J/kg]"} < set(columns)
+
+
 def test_json_is_the_same_table(mission, turning, tmp_path):
     convert(mission, tmp_path / "path.json", epoch="2028-11-20")
     found = json.loads((tmp_path / "path.json").read_text())
@@ -217,13 +246,21 @@ def test_the_ecliptic_is_turned_to_the_frame_of_the_format(to_mars, tmp_path):
     turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     np.testing.assert_allclose(1e3 * states[:, :3], to_mars.position @ turn.T, rtol=1e-13, atol=1.0)
     np.testing.assert_allclose(1e3 * states[0, 3:], turn @ to_mars.legs[0].velocity[0], rtol=1e-13)
+    assert "COMMENT turned from the ecliptic of J2000" in (tmp_path / "path.oem").read_text().splitlines()
+    kicks = re.findall(r"COMMENT impulse at .*, (\S+) (\S+) (\S+) km/s", (tmp_path / "path.oem").read_text())
+    found = [[float(x) for x in kick] for kick in kicks]
+    changes = np.array([kick.change for kick in to_mars.impulses])
+    np.testing.assert_allclose(found, changes @ turn.T / 1e3, rtol=1e-12)
+    # what the scene says may be said again, in letters of another size
+    convert(to_mars, tmp_path / "again.oem", frame="eclipj2000", center="SUN")
+    assert read_oem(tmp_path / "again.oem")[0][0] == keys
 
 
 def test_an_ecliptic_that_is_given_is_turned_too(transfer, tmp_path):
     for frame in ("ECLIPJ2000", "eclipj2000"):
         convert(transfer, tmp_path / "path.oem", **GIVEN | {"frame": frame})
         ((keys, _, states),) = read_oem(tmp_path / "path.oem")
-        assert keys["REF_FRAME"] == "ICRF"
+        assert keys["REF_FRAME"] == "ICRF" and "ecliptic of J2000" in (tmp_path / "path.oem").read_text()
         y, z = transfer.position[-1, 1:] / 1e3
         assert states[-1, 2] == pytest.approx(np.sin(OBLIQUITY) * y + np.cos(OBLIQUITY) * z, rel=1e-12)
 
@@ -260,6 +297,10 @@ def test_czml_has_a_position_with_velocities(mission, tmp_path):
     packet = json.loads((tmp_path / "path.czml").read_text())[1]
     assert packet["position"][0]["referenceFrame"] == "FIXED"
     assert packet["position"][0]["epoch"] == "2028-11-20T06:00:00Z"
+    # TAI is 37 s ahead of UTC
+    convert(mission, tmp_path / "path.czml", **GIVEN, time_system="TAI")
+    packet = json.loads((tmp_path / "path.czml").read_text())[1]
+    assert packet["position"][0]["epoch"] == "2028-11-20T05:59:23Z"
 
 
 def test_utc_by_leap_seconds():
@@ -298,7 +339,11 @@ def test_utc_is_that_of_astropy():
 @pytest.mark.parametrize(
     "of, given, told",
     [
-        ("transfer", {"to": "oem"}, "an OEM needs the date of t = 0, .* give epoch"),
+        (
+            "transfer",
+            {"to": "oem"},
+            "an OEM needs the date of t = 0, the axes and the body at the origin, .* give epoch .* and center",
+        ),
         ("transfer", {"to": "oem", "epoch": "2028-11-20"}, "needs the axes, .* give frame"),
         (
             "transfer",

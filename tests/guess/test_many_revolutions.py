@@ -11,10 +11,10 @@ from dmoc import KeepIn, PointGravity, State, TransferProblem, solve
 from dmoc.checks.verification import verify
 from dmoc.guess.starting import starting_guess
 from dmoc.guess.winding import Winding
+from dmoc.meshes.choices import coarse_to_fine, first_path
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.rungs.tube import in_tube
 from dmoc.scene.problem_file import find, load_problem
-from dmoc.solver.meshes import coarse_to_fine, first_path
 from dmoc.solver.starts import local_optima
 
 GEO = runpy.run_path(str(find("geo_raise")))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm, t
 
 from dmoc import (
     BallForce,
@@ -135,6 +136,31 @@ def test_noise_is_found_where_it_is_not_given():
     assert found.sigma["mass"] == pytest.approx(given.sigma["mass"], rel=1e-3)
 
 
+def test_a_sample_that_lost_one_axis_tells_of_the_other():
+    seen = flight(samples=30, noise=1e-3, velocity_noise=1e-3)
+    half, gone = seen.positions.copy(), seen.positions.copy()
+    half[::3, 0], gone[::3] = np.nan, np.nan
+    one, none = (identify(replace(seen, positions=each), **asked(offset=None)) for each in (half, gone))
+    assert one.fit.degrees == none.fit.degrees + 10 and one.sigma["mass"] < none.sigma["mass"]
+    slow = seen.velocities.copy()
+    slow[::3, 0] = np.nan
+    seen = replace(seen, velocities=slow)
+    # Velocities are those at the begin of each of 29 steps, ten of which have one axis alone.
+    assert identify(seen, **asked(offset=None, velocity_noise=1e-3)).fit.degrees == 60 + 2 * 29 - 10 - 4 - 2
+
+
+def test_degrees_of_freedom_and_students_distribution():
+    """Two positions a sample less the start and the numbers; where noise is found intervals are Student's."""
+    seen = flight(samples=12, noise=1e-3)
+    known = identify(seen, **asked(offset=None))
+    assert known.fit.degrees == 2 * 12 - 4 - 2
+    found = identify(seen, **asked(offset=None, noise=None))
+    low, high = found.interval(0.9)[DRAG]
+    assert (high - low) / (2 * found.sigma[DRAG]) == pytest.approx(t.ppf(0.95, 18), rel=1e-9)
+    low, high = known.interval(0.9)[DRAG]
+    assert (high - low) / (2 * known.sigma[DRAG]) == pytest.approx(norm.ppf(0.95), rel=1e-9)
+
+
 def test_a_right_scene_fits_and_a_wrong_one_is_told():
     seen = flight(noise=1e-3, seed=5)
     right, wrong = identify(seen, **asked()), identify(seen, **asked(effects=[]))
@@ -242,6 +268,8 @@ def test_rates_alone_tell_the_inertia():
     without, found = identify(seen, **ask), identify(seen, **ask, rate_noise=1e-4)
     assert found.sigma["inertia.x"] < 0.3 * without.sigma["inertia.x"] and found.fitting > 1e-3
     assert abs(found.values["inertia.x"] - 0.15) < 4 * found.sigma["inertia.x"]
+    # What is left of attitudes is of the size of their errors.
+    assert np.sqrt(np.mean(found.residuals["attitude"] ** 2)) == pytest.approx(1.0, abs=0.15)
 
 
 def test_thrusters_and_the_centre_of_mass():
@@ -304,8 +332,9 @@ def test_directions_of_single_thrusters():
     ways_found = np.array(found.problem.actuator.directions)
     assert np.linalg.norm(ways_found, axis=1) == pytest.approx(1.0)
     assert ways_found == pytest.approx(np.array([way / np.linalg.norm(way) for way in real]), abs=1e-5)
-    every = identify(flown, **known, tilt=Unknown((0, 0), sigma=0.1), noise=1e-3, attitude_noise=1e-3)
+    every = identify(flown, **known, tilt=Unknown((0.03, -0.02), sigma=0.1), noise=1e-3, attitude_noise=1e-3)
     assert len(every.names) == 8 and every.success
+    assert list(every.values.values())[:4] == pytest.approx([0.06, -0.04, 0, 0], abs=1e-3)
     with pytest.raises(ValueError, match="tilt must be two numbers, or two for each of 4"):
         identify(flown, **known, tilt=[Unknown((0, 0))], noise=1e-3, attitude_noise=1e-3)
     with pytest.raises(ValueError, match="tilt needs Thrusters"):
@@ -327,11 +356,18 @@ def test_propellant_burns_along_the_flight():
     assert [found.values[name] for name in ("mass", DRAG, "exhaust_velocity")] == pytest.approx(truth, rel=1e-5)
     burnt = 0.5 * np.cumsum(np.linalg.norm(flown.forces[:-1], axis=1)) / 50.0
     assert burnt[-1] > 3 and found.mass == pytest.approx(20 - np.append(0, burnt), rel=1e-5)
+    # What is thought to weigh hardly more than what burns is found all the same.
+    light = identify(flown, **asked(offset=None, actuator=thought, mass=Unknown(7.0)), order=6)
+    assert light.values == pytest.approx(found.values, rel=1e-6)
+    with pytest.raises(ValueError, match="a mass of 4 kg burns away: the commands burn"):
+        identify(flown, **asked(offset=None, actuator=thought, mass=Unknown(4.0)), order=6)
     plan = plan_for(found, goal=State((0, 0), (0, 0)), duration=60.0)
     assert plan.mass == found.mass[-1] and plan.actuator.exhaust_velocity == pytest.approx(50.0, rel=1e-5)
     assert not is_unknown(plan.actuator.exhaust_velocity)
     kept = plan_for(found, replace(plan, actuator=BallForce(1.0)))
     assert kept.actuator == BallForce(1.0)
+    fired = plan_for(found, replace(plan, actuator=Engine(7.0, exhaust_velocity=30.0)))
+    assert fired.actuator == Engine(7.0, exhaust_velocity=plan.actuator.exhaust_velocity)
     # One that believes in a constant mass is told that something is wrong.
     wrong = identify(flown, **asked(offset=None), order=6)
     assert abs(wrong.values["mass"] - 20) > 1 and "times as large as the stated noise" in wrong.remarks[0]
@@ -355,6 +391,12 @@ def test_a_turned_engine_and_what_it_cannot_burn():
         **asked(offset=None, mass=20.0, turn=Unknown(0.0)) | {"actuator": Engine(10, exhaust_velocity=50.0)},
     )
     assert turn.values["turn"] == pytest.approx(0.05, abs=1e-6)
+    # It burns as much as ever.
+    commands = pushes(81, 2, 5.0, every=5, seed=1)
+    cos, sin = np.cos(0.05), np.sin(0.05)
+    known = {"mass": 20.0, "effects": [LinearDrag(0.7)], "actuator": Engine(10, exhaust_velocity=50.0)}
+    straight = fly(0.5 * np.arange(81), commands @ [[cos, sin], [-sin, cos]], State((0, 0), (0.1, 0)), **known)
+    assert burning(turn=0.05).positions == pytest.approx(straight.positions, abs=1e-10)
     with pytest.raises(ValueError, match="all propellant burns before the end"):
         burning(mass=3.0)
 

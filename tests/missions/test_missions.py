@@ -25,6 +25,7 @@ from dmoc import (
     Impulse,
     KeepOut,
     Leg,
+    LinearDrag,
     Mission,
     Periodic,
     PointGravity,
@@ -136,6 +137,25 @@ def test_a_stage_is_dropped_with_its_velocity():
     # Tsiolkovsky's equation in each leg, less gravity.
     speed = 50 * np.log(10 / 2) - 2.0 + 60 * np.log(1 / (1 - 10 / 60)) - 1.0
     assert upper.velocity[-1] == pytest.approx([speed], rel=1e-4)
+
+
+@pytest.mark.parametrize("order", [4, 6])
+def test_parts_that_may_be_left_behind_at_several_times(order):
+    """Between two pushes is an optimum, too, to which order 6 led alone."""
+    legs = [Leg((0.5, 6)), Drop(0.305), Leg((0.5, 6)), Drop(0.723), Leg((0.5, 6))]
+    ends = State((0, 0), (0, 0)), State((2.215, -0.247), (0, 0))
+    limits = {"actuator": BallForce(2.632), "duration": 7.511}
+    mission = Mission(4.406, *ends, legs, effects=[LinearDrag(0.477)], **limits)
+    found = dmoc.solve(mission, order=order)
+    assert found.success and dmoc.verify(found).ok
+    assert found.legs[1].duration < 1.5
+    assert found.ladder[-1].objective == found.objective
+    times = iter((0.5, 4.4, mission.duration - 4.9))
+    set_apart = [replace(one, duration=next(times)) if isinstance(one, Leg) else one for one in legs]
+    near = dmoc.solve(replace(mission, legs=set_apart), order=order)
+    between = dmoc.solve(mission, order=order, guess=near)
+    assert between.success and between.legs[1].duration > 3
+    assert between.objective > 1.05 * found.objective
 
 
 def test_impulses_that_burn_follow_tsiolkovskys_equation():

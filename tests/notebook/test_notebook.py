@@ -65,6 +65,19 @@ def test_a_notebook_shows_figure_closing_line_facts_checks_and_meshes(found):
     assert "a &lt;hop&gt;" in html and "<hop>" not in html and "script" not in html
 
 
+def test_a_table_has_the_force_of_the_step_behind_a_node():
+    """Where forces are held; the last node has that of the step before it."""
+    solution = solve(flight(constraints=[]), steps=6, hold=True)
+    held = solution.table()["force x [N]"].tolist()
+    assert held == [*solution.force[:, 0], solution.force[-1, 0]] and held[-1] != held[-3]
+
+
+def test_a_table_has_what_wheels_store():
+    solution = solve(load_problem("satellite_slew").make(), order=2, steps=6)
+    stored = solution.table()[[f"wheel momentum {i} [N m s]" for i in range(1, 5)]]
+    assert stored.to_numpy() == pytest.approx(solution.wheel_momentum, abs=1e-12)
+
+
 def test_an_answer_is_checked_once(found, monkeypatch):
     counted = []
     monkeypatch.setattr(page, "verify", lambda solution: counted.append(solution) or verify(solution))

@@ -38,7 +38,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 
 pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("plotly") is None, reason="plotly is not installed: pip install 'dmoc[report]'"
+    importlib.util.find_spec("plotly") is None, reason="plotly is not installed: pip install plotly"
 )
 
 
@@ -132,7 +132,7 @@ def test_without_plotly_one_line_says_what_to_install(monkeypatch, tmp_path, cap
     with pytest.raises(SystemExit, match="2"):
         main(["solve", "point_to_point", "--plot", str(tmp_path / "p.html")])
     told = capsys.readouterr().err
-    assert "pip install 'dmoc[report]'" in told and told.count("\n") == 1
+    assert "pip install plotly" in told and told.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 

@@ -116,7 +116,7 @@ def test_mean_elements_without_the_packages(monkeypatch):
     found = solve(load_problem("earth_mars_2028").make(departure=84.0, flight=300.0), steps=8)
     assert found.success and len(found.warnings) == 1
     assert "mars (mean elements, within 110,000 km)" in found.warnings[0]
-    assert "pip install 'dmoc[planets]'" in found.warnings[0]
+    assert "pip install jplephem skyfield-data" in found.warnings[0]
     page = words.console()
     with page.capture() as captured:
         page.print(words.scene(found.problem))

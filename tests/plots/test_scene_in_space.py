@@ -7,6 +7,7 @@ import pytest
 
 from dmoc import CircularOrbit, PointGravity, State, TransferProblem, solve, three_body
 from dmoc.plots.page import figure
+from dmoc.plots.path import _columns as columns_of
 from dmoc.plots.style import ATTRACTOR, BODIES
 from dmoc.plots.surroundings import colour_of
 
@@ -77,3 +78,10 @@ def test_known_bodies_have_their_colours():
     _, axes = drawn(raised(0.3))
     (mark,) = [artist for artist in axes.lines if artist.get_label() == "attractor"]
     assert mark.get_markerfacecolor() == "#56B4E9"
+
+
+def test_a_legend_is_no_wider_than_its_panel():
+    """Nine entries are 3, 2, 2 and 2 in four columns: too wide with two long ones at both ends."""
+    labels = ["way of the goal", "path", "start", "goal", "body x", "body y", "body z", "keep-out zone"]
+    assert columns_of([*labels, "force, longest 0.2503 N"]) == 3
+    assert columns_of(["path", "start", "goal", "attractor"]) == 4

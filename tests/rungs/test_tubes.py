@@ -17,9 +17,9 @@ from dmoc import (
     solve,
     verify,
 )
+from dmoc.meshes.choices import first_path
 from dmoc.rungs.tube import MOST_IN_A_TUBE, ON_THE_WALK, around, walked
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import first_path
 
 # On its way to another orbit in a free time a body may go round once more and once more, at ever less effort.
 WINDING = TransferProblem(

@@ -5,10 +5,10 @@ import pytest
 
 from dmoc import CircularOrbit, PointGravity, State, TransferProblem
 from dmoc.guess.starting import starting_guess
+from dmoc.meshes.choices import guess_on
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.units import units_of
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import guess_on
 
 
 def kepler(duration=20.0):

@@ -25,6 +25,7 @@ from dmoc import (
     verify,
 )
 from dmoc.guess.open_ends import two_burns
+from dmoc.meshes.choices import trial_path
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights
@@ -32,7 +33,6 @@ from dmoc.results.facts import off_optimum
 from dmoc.results.flown_cost import unpriced
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.meshes import trial_path
 
 CROSS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 # from place to place in a frame that turns; duality proves that the least fuel is 0.8653420757 N s

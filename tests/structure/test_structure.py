@@ -8,13 +8,26 @@ import numpy as np
 import pytest
 
 import dmoc
-from dmoc import BoxForce, Engine, Fuel, KeepIn, Leg, Mission, State, TransferProblem, UniformGravity
+from dmoc import (
+    BallForce,
+    BoxForce,
+    Engine,
+    Fuel,
+    KeepIn,
+    Leg,
+    Mission,
+    SpeedLimit,
+    State,
+    Time,
+    TransferProblem,
+    UniformGravity,
+)
 from dmoc.missions.answer import answered
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Climb, solve_mission
 from dmoc.scene.problem_file import load_problem
 from dmoc.structure import solve as structure
-from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain
+from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain, surely_seen
 from dmoc.structure.build import mission_of, path_of
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
@@ -70,7 +83,7 @@ def test_a_singular_arc_has_one_polynomial_for_its_force():
     assert dmoc.verify(found).ok
 
 
-@pytest.mark.parametrize(("order", "steps"), [(4, 10), (4, 20), (2, 60), (8, 12)])
+@pytest.mark.parametrize(("order", "steps"), [(4, 10), (4, 20), (2, 60), (8, 12), (8, 25)])
 def test_a_way_along_a_limit(order, steps):
     found = dmoc.solve(bryson_denham(), order, steps, structure=True)
     assert found.success and len(found.legs) == 3
@@ -85,6 +98,22 @@ def test_a_halo_orbit_left_and_another_reached():
     assert found.success and len(found.legs) == 7
     assert found.final_mass == pytest.approx(0.984537, abs=5e-7)
     assert dmoc.verify(found).ok
+
+
+@pytest.mark.slow
+def test_five_burns_whose_begins_hardly_matter():
+    found = dmoc.solve(gallery("leo_raise"), structure=True)
+    assert found.success and kinds(found) == [COAST, BURN] * 5
+    # 48 steps of order 6 and 32 of order 8 agree to 2e-7 kg.
+    assert found.objective == pytest.approx(6.6802297, abs=5e-7)
+    assert dmoc.verify(found).ok
+
+
+def test_arcs_shorter_than_from_node_to_node_are_not_seen_for_sure():
+    coarse = dmoc.solve(gallery("two_body_fuel"), order=4, steps=20)
+    ends = [(BURN, 0.2), (COAST, 0.5), (BURN, 0.51), (COAST, 0.7), (BURN, 1.0)]
+    seen = surely_seen(tuple(Arc(*end) for end in ends), coarse)
+    assert [(arc.kind, arc.end) for arc in seen] == [(BURN, 0.2), (COAST, 0.7), (BURN, 1.0)]
 
 
 @pytest.mark.slow
@@ -174,6 +203,55 @@ def test_a_way_along_a_limit_is_undercut_at_order_2_alone():
     assert np.log2((4.0 - rough[0].objective) / (4.0 - rough[1].objective)) > 1.7
     for order in (4, 6, 8):
         assert solve_mission(found.problem, order, 10, guess=found).objective == pytest.approx(4.0, rel=1e-12)
+
+
+def sped(limit, duration, **more):
+    """One metre from rest to rest, never faster than a limit."""
+    ends = State((0.0,), (0.0,)), State((1.0,), (0.0,))
+    return TransferProblem(1.0, *ends, duration, constraints=[SpeedLimit(limit)], **more)
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 20), (2, 60), (8, 12)])
+def test_the_least_effort_below_a_speed_is_exact(order, steps):
+    """The force falls linearly to zero where the speed is reached: 2 v / (3 t) is what is lost of the way."""
+    found = dmoc.solve(sped(1.2, 1.0), order, steps, structure=True)
+    rising = 1.5 * (1 - 1 / 1.2)
+    assert found.success and found.reason == "3 legs: arc 0.25 s, along a limit 0.5 s, arc 0.25 s"
+    assert found.legs[0].duration == pytest.approx(rising, rel=1e-9)
+    assert found.objective == pytest.approx((2 * 1.2 / rising) ** 2 * rising / 3, rel=1e-12)
+    assert found.legs[1].velocity == pytest.approx(1.2, abs=1e-12)
+    assert found.legs[1].path.control[:, 0] == pytest.approx(0.0, abs=1e-9)
+    assert dmoc.verify(found).ok
+
+
+@pytest.mark.parametrize(("order", "steps"), [(4, 20), (2, 60)])
+def test_the_least_time_below_a_speed_is_exact(order, steps):
+    problem = sped(0.6, (0.1, 10.0), actuator=BoxForce(1.0), objective=Time())
+    found = dmoc.solve(problem, order, steps, structure=True)
+    assert found.success and kinds(found) == ["+x", FREE, "-x"]
+    assert [leg.duration for leg in found.legs] == pytest.approx([0.6, 1 / 0.6 - 0.6, 0.6], rel=1e-12)
+    assert found.objective == pytest.approx(1 / 0.6 + 0.6, rel=1e-13)
+    assert dmoc.verify(found).ok
+
+
+def test_a_speed_and_a_force_at_their_limits_in_the_plane():
+    ends = State((0, 0), (0, 0)), State((1, 0.5), (0, 0))
+    limits = {"actuator": BallForce(3.5), "constraints": [SpeedLimit(0.95)]}
+    problem = TransferProblem(1.0, *ends, 1.5, effects=[UniformGravity((0, -1))], **limits)
+    found = dmoc.solve(problem, structure=True)
+    assert found.success and kinds(found) == ["full force", FREE, FREE, FREE, "full force"]
+    # The forces of both sides are alike where the speed is reached, and where it is left.
+    for one, two in zip(found.legs[1:3], found.legs[2:4], strict=True):
+        assert two.path.control[0] == pytest.approx(one.path.control[-1], abs=1e-9)
+    speed = np.linalg.norm(found.legs[2].velocity, axis=1)
+    # It is kept to at the Gauss points of the steps; the speeds at their ends come from momenta.
+    assert speed == pytest.approx(0.95, abs=1e-6)
+    assert found.objective == pytest.approx(dmoc.solve(problem, tol=1e-5, structure=False).objective, rel=1e-5)
+    assert dmoc.verify(found).ok
+
+
+def test_a_speed_that_is_not_reached_makes_no_leg():
+    assert not hasattr(dmoc.solve(sped(1.6, 1.0), structure=True), "legs")
 
 
 def test_an_empty_leg_is_dropped():

@@ -13,6 +13,7 @@ from dmoc import PointGravity, Spring, State, TransferProblem, solve
 from dmoc.basics.memory import remembered
 from dmoc.charts.study import save_study
 from dmoc.cli.app import main
+from dmoc.reports.study import observed_orders
 from dmoc.scene.problem_file import load_problem
 from dmoc.studies.accuracy import Trial, best_known, frontier, time_to_reach, work_precision
 from dmoc.studies.drift import drift, kepler
@@ -117,6 +118,31 @@ def test_time_to_reach_is_interpolated_on_the_frontier():
     # the slow solve at 1e-3 is not on the frontier; halfway in the logarithm of the error
     (found,) = time_to_reach(rows, (1e-4,)).values()
     assert found == [pytest.approx(0.2)]
+
+
+def test_the_observed_order_is_the_slope_between_meshes():
+    """Of a method that loses a factor of 16 at each halving it is 4; none where there is nothing to compare."""
+    errors = {"a": [1.6e-3, 1e-4, 1e-4, None], "b": [1e-5, 2.5e-6]}
+    rows = [
+        Trial(
+            name,
+            4,
+            10 * 2**i,
+            11,
+            1.0,
+            error or 1.0,
+            0.0,
+            1,
+            1,
+            0.1,
+            0.1,
+            True,
+            "solved" if error else "failed",
+        )
+        for name, known in errors.items()
+        for i, error in enumerate(known)
+    ]
+    assert observed_orders(rows) == [None, pytest.approx(4.0), None, None, None, pytest.approx(2.0)]
 
 
 def test_time_to_reach_never_extrapolates():

@@ -115,7 +115,7 @@ def test_every_body_of_a_team_is_simulated(folder, capsys):
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (("export", "swap.py", "planner"), "a team of bodies is not exported"),
+        (("export", "swap.py", "planner", "--order", "3"), "order must be one of 2, 4, 6, 8"),
         (("effects", "swap.py"), "is a team of bodies"),
         (("study", "swap.py"), "is a team of bodies"),
         (("solve", "swap.py", "--structure"), "a dmoc.Team has neither"),

@@ -229,19 +229,21 @@ def least_steps(problem: TransferProblem, path: DiscretePath) -> int:
     falls = problem.attraction.lone is None and is_uneven(problem, path)
     if falls:
         mesh = np.interp(mesh, np.linspace(0.0, 1.0, len(path.mesh)), path.mesh)
-    sample = path.onto(mesh, 2, path.hold)
-    slopes = np.gradient(sample.position, sample.duration * sample.fractions, axis=0)
-    dynamics = Dynamics.of(problem)
-    flow, _ = flow_matrices(
-        dynamics, sample, problem.start_time, rates_along(dynamics, sample.position, slopes)
-    )
-    rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
-    # A mode that dies out need not be followed.
-    fastest = np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
+    fastest = fastest_rates(problem, path.onto(mesh, 2, path.hold))
     if falls:
         h = (len(mesh) - 1) * np.diff(mesh)
         fastest = fastest * np.maximum(np.append(h, 0.0), np.append(0.0, h))
     return int(np.clip(path.duration * fastest.max(), 2, MOST_COARSE))
+
+
+def fastest_rates(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
+    """The rate of the fastest mode of the linearised motion at each node of a path of order 2 [1/s]."""
+    slopes = np.gradient(path.position, path.duration * path.fractions, axis=0)
+    dynamics = Dynamics.of(problem)
+    flow, _ = flow_matrices(dynamics, path, problem.start_time, rates_along(dynamics, path.position, slopes))
+    rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
+    # A mode that dies out need not be followed.
+    return np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
 
 
 def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:
@@ -262,12 +264,7 @@ def best_order(problem: TransferProblem, path: DiscretePath, objective: float, t
         return 2, "controls stay between their limits where no cost decides on them"
     if len(corners(problem, path, objective)):
         return 4, "controls switch or limits set in"
-    return order_of_smooth(tol), "smooth"
-
-
-def order_of_smooth(tol: float) -> int:
-    """The order that pays where nothing switches and no limit sets in."""
-    return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest)
+    return next(order for order, loosest in ((4, 1e-3), (6, 1e-5), (8, 0.0)) if tol >= loosest), "smooth"
 
 
 def with_as_many_nodes(path: DiscretePath, order: int) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""How many steps, of which order, on which mesh."""
