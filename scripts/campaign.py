@@ -164,9 +164,12 @@ def table(outcomes: list[Outcome]) -> str:
     return HEAD + "".join(lines)
 
 
-def journaled(path: Path | None, scenes: Iterable[tuple[str, int]], again: bool) -> Iterator[Outcome]:
+def journaled(
+    path: Path | None, scenes: Iterable[tuple[str, int]], again: bool, known_alone: bool = False
+) -> Iterator[Outcome]:
     """The outcomes of scenes, from a journal where it has them; others, and if `again` those that are not
-    green, are run and written into it, one line each. The last line of a scene counts.
+    green, are run and written into it, one line each. The last line of a scene counts. If `known_alone`, none
+    is run.
     """
     known: dict[tuple[str, int], Outcome] = {}
     if path is not None and path.exists():
@@ -175,6 +178,8 @@ def journaled(path: Path | None, scenes: Iterable[tuple[str, int]], again: bool)
             known[one.family, one.seed] = one
     for family, seed in scenes:
         one = known.get((family, seed))
+        if one is None and known_alone:
+            continue
         if one is None or (again and one.verdict != "green"):
             one = run(family, seed)
             if path is not None:
@@ -191,12 +196,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, help="this scene alone")
     parser.add_argument("--journal", type=Path, help="keep outcomes in this file, and take known ones from it")
     parser.add_argument("--again", action="store_true", help="run anew what is not green in the journal")
+    parser.add_argument("--known", action="store_true", help="what the journal has, and nothing more")
     parser.add_argument("--write", action="store_true", help="write the table into docs/campaign.md")
     given = parser.parse_args()
     families = [given.family] if given.family else list(FAMILIES)
     seeds = range(given.first, given.first + given.each) if given.seed is None else [given.seed]
     outcomes = []
-    for one in journaled(given.journal, [(family, seed) for seed in seeds for family in families], given.again):
+    scenes = [(family, seed) for seed in seeds for family in families]
+    for one in journaled(given.journal, scenes, given.again, given.known):
         outcomes.append(one)
         if one.verdict != "green" or given.seed is not None:
             print(f"{one.family} {one.seed}: {one.verdict}, {one.seconds:.1f} s, {one.why}", flush=True)
