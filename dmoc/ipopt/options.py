@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from dmoc.guess.coast import VERY_MANY_TURNS
-from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
 # Rounding loosens the tolerance to this at most [-]: at 2e-8 the costates of 140 revolutions are 3e-5 of the
@@ -163,10 +161,4 @@ def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, A
         # of four problems. After a change of the mesh or of the rounding of |F| it would take up to 13 times as
         # many.
         return {"ipopt.mu_strategy": "adaptive"}
-    other = rounded or warm or problem.free_duration or problem.actuator.rows(ca.SX.sym("u", problem.controls))
-    if problem.limited and not other and not has_linear_controls(problem):
-        # Where the cost is curved in all controls and their limits are plain numbers this took a quarter less
-        # iterations over 35 random scenes, and led to the same optima; at a limit of |F|, with free times, or
-        # with costs that are linear in controls it takes up to twice as many.
-        return {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
     return {}
