@@ -108,8 +108,8 @@ def climb_to_tolerance(
             return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
     refinement = _Refinement(ladder, tol, local, reason)
-    # Close past an attractor an answer on one mesh does not tell its own error: the cost of a flyby was six times
-    # as far off as its steps and the miss of the goal said.
+    # Close past an attractor one mesh does not tell its own error: the cost of a flyby was six times as far off
+    # as its steps and the miss of the goal said.
     at_once = smooth and not is_uneven(ladder.problem, path)
     for _ in range(MOST_AT_ONCE if at_once else 0):
         if refinement.meets_at_once(trial):
