@@ -8,10 +8,9 @@ import numpy as np
 
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import fastest_rates, graded_guess, is_uneven
-from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.stability import stable_from, steps_to_turn
+from dmoc.motion.stability import steps_to_turn
 from dmoc.scene.problem import TransferProblem
 
 # At all tolerances this order takes the fewest nodes where nothing switches and no limit sets in.
@@ -49,9 +48,7 @@ def smooth_path(problem: TransferProblem, tol: float, guess: Any = None) -> Disc
         return starting_guess(problem, uniform_mesh(steps), ORDER, False, guess)
 
     first = on(count)
-    stable, _ = stable_from(Dynamics.of(problem), first, problem.start_time, problem.duration_bounds[1])
-    enough = max(2 * stable, steps_to_turn(first))
-    return on(enough) if enough > count else first
+    return on(enough) if (enough := steps_to_turn(first)) > count else first
 
 
 def steps_for(tol: float, turned: np.ndarray, off: float) -> int:

@@ -111,14 +111,13 @@ def climb_to_tolerance(
     # Close past an attractor one mesh does not tell its own error: the cost of a flyby was six times as far off
     # as its steps and the miss of the goal said.
     at_once = smooth and not is_uneven(ladder.problem, path)
-    for _ in range(MOST_AT_ONCE if at_once else 0):
+    for more in reversed(range(MOST_AT_ONCE if at_once else 0)):
         if refinement.meets_at_once(trial):
             return refinement.settled(reason)
-        mesh = finer(trial.path, refinement.errors[trial.number], tol)
-        again = ladder.solve_on(trial.path.onto(mesh, order, hold))
-        if not again.solved:
-            break
-        trial = again
+        if more:
+            mesh = finer(trial.path, refinement.errors[trial.number], tol)
+            again = ladder.solve_on(trial.path.onto(mesh, order, hold))
+            trial = again if again.solved else trial
     return refinement.of(trial, order, hold)
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmoc import Fuel, solve, verify
-from dmoc.meshes.smooth import FEWEST, MOST, OFF, finer, steps_for
+from dmoc import Attitude, Fuel, Torque, TransferProblem, solve, verify
+from dmoc.meshes.smooth import FEWEST, MOST, OFF, finer, smooth_path, steps_for
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.motion.stability import steps_to_turn
 from dmoc.results.estimate import estimate_at_once
 from dmoc.scene.problem_file import load_problem
 
@@ -33,6 +34,15 @@ def test_without_an_attractor_two_meshes_at_most(name):
     found = solve(problem, tol=1e-7)
     assert len(found.ladder) <= 2 and found.error.largest <= 1e-7
     assert abs(found.objective / exact - 1) <= 1e-7
+    # A step more or two bring the error down: nothing is cut in halves.
+    assert found.steps < 1.5 * found.ladder[0].steps
+
+
+def test_steps_follow_a_body_that_spins_though_nothing_drives_it():
+    spinning = Attitude((1, 0, 0, 0), (0, 0, 30.0))
+    problem = TransferProblem(1.0, spinning, spinning, 5.0, inertia=(1, 1, 1), actuator=Torque())
+    path = smooth_path(problem, 0.1)
+    assert len(path.mesh) - 1 == steps_to_turn(path) > FEWEST
 
 
 def test_steps_grow_with_the_eighth_root_of_the_accuracy():
