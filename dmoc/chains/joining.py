@@ -14,13 +14,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.chains.again import kernel_again
 from dmoc.chains.within import Placed
 from dmoc.configurations.base import Configuration
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake, values_of, with_symbols
@@ -196,7 +196,7 @@ class JointWriter:
         places, symbols = _merged(self._places, self._symbols)
         expressions = [row.expression for row in self.rows]
         given = ca.SX(0, 1), self.given.parameters
-        made = kernel("joint", symbols, *given, ca.vertcat(*expressions), ca.SX(self.cost))
+        made = kernel_again("joint", symbols, *given, ca.vertcat(*expressions), ca.SX(self.cost))
         return Block(made, places[:, None], targets, np.empty((0, 1)))
 
 

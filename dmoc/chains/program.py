@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import attrgetter
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.chains.again import assembled_again, kernel_again
 from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
 from dmoc.chains.path import MissionPath, joint_cost
 from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows
@@ -17,8 +19,8 @@ from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, 
 from dmoc.ipopt.options import NEAR, rounding, settings_for
 from dmoc.ipopt.run import Answer, Watch, make_solver, run
 from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
-from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_START, Layout
+from dmoc.nlp.transcription import MOST_HELD_NODES
 from dmoc.nlp.units import Units, units_of
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
@@ -89,7 +91,7 @@ class MissionProgram:
         ]
         if whole:
             symbols = expressions, ca.SX(0, 1), given.parameters
-            made = kernel("mission", *symbols, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
+            made = kernel_again("mission", *symbols, ca.vertcat(*[r.expression for r in whole]), ca.SX(0))
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         for placed, plan, name in zip(legs, mission.plan, mission.leg_names, strict=True):
             smooth, controls, weights = polynomial_rows(placed, plan)
@@ -134,8 +136,18 @@ class MissionProgram:
 
     def assembly(self, compiled: bool = False) -> Assembly:
         """The functions of the NLP with their sparse derivatives; with `compiled` as machine code."""
-        scaling = Scaling.of(self.blocks, self.column_scales(), self.row_scales(), 1 / self.cost)
-        return assemble(self.blocks, scaling, self.sizes[2], compiled)
+        return assemble(self.blocks, self.scaling, self.sizes[2], compiled)
+
+    @cached_property
+    def scaling(self) -> Scaling:
+        """The numbers of units and meshes."""
+        return Scaling.of(self.blocks, self.column_scales(), self.row_scales(), 1 / self.cost)
+
+    def _held(self, compiled: bool) -> Assembly:
+        """As `assembly`, with units and meshes as parameters, which serves programs of the same structure."""
+        if sum(leg.program.columns["position"].count for leg in self.legs) > MOST_HELD_NODES:
+            return self.assembly(compiled)
+        return assembled_again(self.blocks, self.scaling, self.sizes[2], compiled)
 
     def parameters(self) -> np.ndarray:
         """The parameters of all legs, then of both ends [SI]."""
@@ -217,19 +229,21 @@ class MissionProgram:
     def solve(
         self,
         path: MissionPath,
+        settings: dict[str, Any],
         options: dict[str, Any],
         watch: Watch | None = None,
         carried: bool = False,
         compiled: bool = False,
     ) -> Answer:
-        """One run of Ipopt from a path on these meshes."""
+        """One run of Ipopt from a path on these meshes, with these settings and the user's options."""
         lbx, ubx, lbg, ubg = self.bounds()
         lam_x, lam_g = self.multipliers(path)
-        solver = make_solver(
-            self.assembly(compiled), self.settings(path.warm, carried, path.near), options, watch
-        )
+        assembly = self._held(compiled)
+        settings = self.settings(path.warm, carried, path.near) | settings
+        solver = make_solver(assembly, settings, options, watch)
         given = {"x0": np.clip(self.pack(path), lbx, ubx), "lam_x0": lam_x, "lam_g0": lam_g}
-        bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg, "p": self.parameters()}
+        parameters = np.concatenate([self.parameters(), assembly.numbers(self.scaling)])
+        bounds = {"lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg, "p": parameters}
         return run(solver, self._rounding, **given, **bounds)
 
     @property

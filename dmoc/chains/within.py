@@ -8,13 +8,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.chains.again import kernel_again
 from dmoc.legs.legs import Joint, Leg
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.assembly import Block
-from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
@@ -170,7 +170,7 @@ def polynomial_rows(placed: Placed, leg: Leg) -> tuple[list[Row], np.ndarray, np
 def polynomial_block(columns: np.ndarray, weights: np.ndarray, targets: np.ndarray) -> Block:
     """The block of the rows that `polynomial_rows` names."""
     z, d = ca.SX.sym("z", len(columns)), ca.SX.sym("d", len(weights))
-    made = kernel("polynomial", z, d, ca.SX(0, 1), z[0] - ca.dot(d, z[1:]), ca.SX(0))
+    made = kernel_again("polynomial", z, d, ca.SX(0, 1), z[0] - ca.dot(d, z[1:]), ca.SX(0))
     return Block(made, columns, targets, weights)
 
 

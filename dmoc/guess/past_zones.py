@@ -14,6 +14,8 @@ from dmoc.scene.problem import TransferProblem
 # A path that was bent past one zone is bent at most this many times a zone to clear the others: two zones that
 # overlap may each push it into the other.
 BENDS_A_ZONE = 2
+# A path that is in a zone by more than this part of the zone's size runs through it, on neither side [-].
+THROUGH = 0.5
 # Two paths are one way if they differ by less than this part of the extent [-].
 SAME_WAY = 0.05
 
@@ -73,6 +75,18 @@ def _past_the_others(
         worth = [-float(np.abs(bend).max()) if nearer else float((bend * aside).sum()) for bend in ways]
         path = bent(problem, path, deepest, ways[int(np.argmax(worth))])
     return path, False
+
+
+def has_sides(problem: TransferProblem, path: DiscretePath) -> bool:
+    """Whether a path passes zones on sides that an answer should keep to: it runs through none of them."""
+    times = problem.start_time + path.duration * path.fractions
+    zones = [zone for zone in problem.constraints if not (zone.turns_body or zone.limits_speed)]
+    zones = [zone for zone in zones if not np.isfinite(zone.bounds(problem.dimension)).any()]
+    places = [path.place_of(zone) for zone in zones]
+    return bool(zones) and all(
+        zone.excess_at(times, place, np.zeros_like(place)).max() <= THROUGH * zone.feature()
+        for zone, place in zip(zones, places, strict=True)
+    )
 
 
 def off_centres(problem: TransferProblem, guess: DiscretePath) -> DiscretePath:

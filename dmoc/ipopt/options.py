@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from dmoc.basics.memory import remembered
 from dmoc.guess.coast import VERY_MANY_TURNS
+from dmoc.guess.past_zones import has_sides
+from dmoc.motion.path import DiscretePath
+from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
 # Rounding loosens the tolerance to this at most [-]: at 2e-8 the costates of 140 revolutions are 3e-5 of the
@@ -162,3 +167,25 @@ def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, A
         # many.
         return {"ipopt.mu_strategy": "adaptive"}
     return {}
+
+
+def barrier_from(problem: TransferProblem, guess: DiscretePath) -> dict[str, Any]:
+    """Options for the barrier parameter in a run from a guess, where it is better that it may also rise.
+
+    Where the cost is curved in all controls and their limits are plain numbers this takes a quarter less
+    iterations over 35 random scenes, and leads to the same optima; at a limit of |F|, with free times, or with
+    costs that are linear in controls up to twice as many. From a way past zones it may lead to the other side.
+    """
+    if not problem.limited or problem.turns or problem.free_duration or problem.actuator.smoothing is not None:
+        return {}
+    parts = problem.actuator, problem.objective, problem.effects, problem.dimension
+    plain = remembered(lambda: _has_plain_controls(problem), "plain controls", *parts)
+    if not plain or has_sides(problem, guess):
+        return {}
+    return {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
+
+
+def _has_plain_controls(problem: TransferProblem) -> bool:
+    """Whether the cost is curved in all controls, and their limits are plain numbers."""
+    rows = problem.actuator.rows(ca.SX.sym("u", problem.controls))
+    return not rows and not has_linear_controls(problem)

@@ -110,7 +110,7 @@ class Climb:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
             limits["ipopt.theta_max_fact"] = STAYING if self.valley is None else VALLEY
         built = time.perf_counter() - begun
-        answer = program.solve(path, limits | self.options, watch, carried, self.compiled)
+        answer = program.solve(path, limits, self.options, watch, carried, self.compiled)
         if watch.error is not None:
             raise watch.error
         level = Level(

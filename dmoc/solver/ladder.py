@@ -14,6 +14,7 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.options import barrier_from
 from dmoc.ipopt.run import STATUSES, Interrupt
 from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.motion.dynamics import Dynamics
@@ -73,9 +74,8 @@ class Ladder:
         """
         refuse_unstable(self.dynamics, first, self.problem.start_time, self.problem.duration_bounds)
         order, meshes = coarse_to_fine(self.problem, first)
-        known = first
-        if len(meshes) > 1 and not first.multipliers:
-            known = starting_guess(self.problem, meshes[0], order, first.hold, given)
+        anew = len(meshes) > 1 and not first.multipliers
+        known = starting_guess(self.problem, meshes[0], order, first.hold, given) if anew else first
         refuse_undefined_motion(self.dynamics, self.problem, known)
         if first.multipliers:
             return self._explained(self.solve_on(first), first, None, None)
@@ -232,7 +232,7 @@ class Ladder:
         near = in_tube(problem, guess)
         if near is not None and (tubed := self._attempt(guess, near, limits)).solved:
             guess = out_of_tube(tubed.path)
-        here = partial(self._attempt, problem=problem, limits=limits)
+        here = partial(self._attempt, problem=problem, limits=barrier_from(problem, guess) | limits)
         return led(here(guess), self.ask, problem, guess, here)
 
     def _attempt(

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import cubic_spline
 from dmoc.effects.base import Body
 from dmoc.legs.events import Event, Instant, Passed
@@ -79,11 +80,18 @@ def room(
     problem: TransferProblem, path: DiscretePath, surface: Surface, at: np.ndarray, places: np.ndarray
 ) -> np.ndarray:
     """By how much places keep a limit, in its own unit; negative where they break it."""
-    t, q, m = ca.SX.sym("t"), ca.SX.sym("q", places.shape[1]), ca.SX.sym("m")
-    gap, limit = limit_of(problem.constraints[surface.constraint], surface, t, q, m)
+    constraint, size = problem.constraints[surface.constraint], places.shape[1]
+    gap, limit = remembered(lambda: _gap(constraint, surface, size), "gap", constraint, surface, size)
     times, masses = problem.start_time + path.duration * at, np.interp(at, path.fractions, path.mass)
-    values = ca.Function("gap", [t, q, m], [gap])(times[None], places.T, masses[None]).full().ravel()
+    values = gap(times[None], places.T, masses[None]).full().ravel()
     return (limit - values) * (1 if surface.upper else -1)
+
+
+def _gap(constraint: Constraint, surface: Surface, size: int) -> tuple[ca.Function, float]:
+    """(time, place, mass) -> what a limit limits, and the value that it has on the surface."""
+    t, q, m = ca.SX.sym("t"), ca.SX.sym("q", size), ca.SX.sym("m")
+    gap, limit = limit_of(constraint, surface, t, q, m)
+    return ca.Function("gap", [t, q, m], [gap]), limit
 
 
 def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[tuple[float, Surface]]:
@@ -148,17 +156,19 @@ class Tangent(Event):
     surface: Surface
 
     def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
-        t, q, v, m = (
-            ca.SX.sym("t"),
-            ca.SX.sym("q", here.q.numel()),
-            ca.SX.sym("v", here.v.numel()),
-            ca.SX.sym("m"),
-        )
+        sizes = here.q.numel(), here.v.numel()
+        across = remembered(lambda: self._across(*sizes), "across", self.constraint, self.surface, *sizes)
+        speed = across(here.t, here.q, here.v, here.m)
+        return Passed(here, [Row("speed", speed, 0.0, 0.0, "m/s")])
+
+    def _across(self, places: int, speeds: int) -> ca.Function:
+        """(time, place, velocity, mass) -> the part of the velocity across the surface [m/s]."""
+        t, m = ca.SX.sym("t"), ca.SX.sym("m")
+        q, v = ca.SX.sym("q", places), ca.SX.sym("v", speeds)
         gap = ca.SX(limit_of(self.constraint, self.surface, t, q, m)[0])
         slope = ca.gradient(gap, q)
         across = (ca.dot(slope, v) + ca.jacobian(gap, t)) / ca.sqrt(ca.dot(slope, slope))
-        speed = ca.Function("across", [t, q, v, m], [across])(here.t, here.q, here.v, here.m)
-        return Passed(here, [Row("speed", speed, 0.0, 0.0, "m/s")])
+        return ca.Function("across", [t, q, v, m], [across])
 
     def words(self) -> str:
         return f"along the limit: the body {self.constraint.words()}"
