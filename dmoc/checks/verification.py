@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, of_kind, short
 from dmoc.basics.digits import lasting
+from dmoc.basics.memory import unchanged
 from dmoc.checks.balances import amplification, balance, energy_gap, misses
 from dmoc.checks.evidence import ROUNDING, Evidence
 from dmoc.checks.limits import excesses
@@ -41,6 +42,7 @@ CONSTRAINT = 1e-10
 TURN_MOST = np.radians(90)
 
 
+@unchanged()
 def verify(
     solution: Solution,
     problem: TransferProblem | None = None,

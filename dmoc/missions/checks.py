@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.memory import unchanged
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.checks.evidence import Evidence
@@ -26,6 +27,7 @@ JOINED = 1e-8
 LEAST = 1e-2
 
 
+@unchanged()
 def verify_mission(solution: MissionSolution, problem: Any = None, more: Sequence = ()) -> Report:
     """Check a mission, without a look at the optimiser's own verdict on it.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,9 +62,18 @@ class Attempt:
     def solved(self) -> bool:
         return self.answer.status == "solved"
 
-    @property
+    @cached_property
     def path(self) -> MissionPath:
         return self.program.path(self.answer)
+
+    @cached_property
+    def errors(self) -> list[np.ndarray]:
+        """The error of every step of each leg, of extent and speed [-]."""
+        path, stretches = self.path, self.program.mission.stretches
+        return [
+            local_errors(Dynamics.of(problem), leg, begin)
+            for problem, leg, begin in zip(stretches, path.legs, path.begins, strict=True)
+        ]
 
 
 class Climb:
@@ -200,7 +210,7 @@ class Climb:
         Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
         by about the part `still` of it.
         """
-        error, errors = None, self._errors(attempt)
+        error, errors = None, attempt.errors
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
@@ -216,7 +226,7 @@ class Climb:
             if not found.solved:
                 break
             changes.append(_change(attempt, found))
-            attempt, errors = found, self._errors(found)
+            attempt, errors = found, found.errors
             if tol is not None:
                 error = self._error(attempt, changes, _largest(errors))
                 self.levels[-1] = replace(self.levels[-1], error=error.largest)
@@ -235,7 +245,7 @@ class Climb:
 
     def largest_error(self, attempt: Attempt) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
-        return _largest(self._errors(attempt))
+        return _largest(attempt.errors)
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
@@ -243,13 +253,6 @@ class Climb:
         for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
             missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
         return Error(summed, left_after(changes), missed)
-
-    def _errors(self, attempt: Attempt) -> list[np.ndarray]:
-        path = attempt.path
-        return [
-            local_errors(Dynamics.of(problem), leg, begin)
-            for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True)
-        ]
 
 
 def solve_mission(

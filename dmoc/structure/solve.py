@@ -202,15 +202,17 @@ def _improved(
         settled = _settled(climb, problem, arcs, legs, (spent + most, iterations))
         if settled is None:
             return None
-        known, attempt = settled
-        found = answered(climb, attempt)
-        if attempt.solved:
-            attempt = _of_high_order(climb, problem, attempt, tol)
-            found = answered(climb, attempt)
+        known, first, found = settled
+        arcs = known
+        if first.solved:
+            attempt, found = _of_high_order(climb, problem, first, found, tol)
             # What meshes of low order do not show may be seen now, and is, before they are refined.
-            if alike(improved(problem, known, found), known):
-                found = answered(climb, *climb.refined(attempt, tol, ACCURATE, STILL), tol)
-        arcs, legs = improved(problem, known, found) if found.optimal else known, found.legs
+            arcs = known if attempt is first else improved(problem, known, found)
+            if alike(arcs, known):
+                last, error, met = climb.refined(attempt, tol, ACCURATE, STILL)
+                found = answered(climb, last, error, met, tol)
+                arcs = improved(problem, known, found) if found.optimal and last is not attempt else arcs
+        legs = found.legs
         if alike(arcs, known):
             return structured(found, arcs=plain(arcs), reason=told(arcs, found))
     return None
@@ -227,8 +229,8 @@ def _settled(
     arcs: tuple[Arc, ...],
     legs: Sequence[Solution],
     most: tuple[int, int],
-) -> tuple[tuple[Arc, ...], Attempt] | None:
-    """The arcs that neither lack one nor have one in vain, and their answer.
+) -> tuple[tuple[Arc, ...], Attempt, MissionSolution] | None:
+    """The arcs that neither lack one nor have one in vain, the attempt at them and its answer.
 
     `most` is how much work there may be at all, and after how many iterations an attempt ends.
     """
@@ -244,24 +246,26 @@ def _settled(
         if attempt.solved and attempt.level.iterations > MOST_ITERATIONS:
             climb.valley = NEAR[0]
         if attempt.answer.status == "stopped":
-            return arcs, attempt
+            return arcs, attempt, answered(climb, attempt)
         if not attempt.solved:
             return None
         found = answered(climb, attempt)
         better = improved(problem, arcs, found)
         if alike(better, arcs):
-            return better, attempt
+            return better, attempt, found
         arcs, legs = better, found.legs
     return None
 
 
-def _of_high_order(climb: Climb, problem: TransferProblem, attempt: Attempt, tol: float | None) -> Attempt:
-    """The answer on meshes of high order, where those it was found on are not fine enough."""
+def _of_high_order(
+    climb: Climb, problem: TransferProblem, attempt: Attempt, found: MissionSolution, tol: float | None
+) -> tuple[Attempt, MissionSolution]:
+    """The attempt and the answer on meshes of high order, where those it was found on are not fine enough."""
     if climb.largest_error(attempt) <= (ACCURATE if tol is None else tol):
-        return attempt
-    course = Course.of(answered(climb, attempt).legs)
+        return attempt, found
+    course = Course.of(found.legs)
     path = attempt.path
     spans = [(begin, begin + leg.duration) for begin, leg in zip(path.begins, path.legs, strict=True)]
     onto = path.onto([(course.mesh(problem, span, ORDER), ORDER) for span in spans])
     finer = climb.on_finer(onto, most=2 * MOST_ITERATIONS)
-    return finer if finer.solved else attempt
+    return (finer, answered(climb, finer)) if finer.solved else (attempt, found)

@@ -77,12 +77,21 @@ def _held(problem: TransferProblem, path: DiscretePath, surface: Surface, acts: 
 
 
 def room(
-    problem: TransferProblem, path: DiscretePath, surface: Surface, at: np.ndarray, places: np.ndarray
+    problem: TransferProblem,
+    path: DiscretePath,
+    surface: Surface,
+    at: np.ndarray,
+    places: np.ndarray,
+    begin: float | None = None,
 ) -> np.ndarray:
-    """By how much places keep a limit, in its own unit; negative where they break it."""
+    """By how much places keep a limit, in its own unit; negative where they break it.
+
+    The path begins at the time `begin` [s], or that of the problem.
+    """
     constraint, size = problem.constraints[surface.constraint], places.shape[1]
     gap, limit = remembered(lambda: _gap(constraint, surface, size), "gap", constraint, surface, size)
-    times, masses = problem.start_time + path.duration * at, np.interp(at, path.fractions, path.mass)
+    begin = problem.start_time if begin is None else begin
+    times, masses = begin + path.duration * at, np.interp(at, path.fractions, path.mass)
     values = gap(times[None], places.T, masses[None]).full().ravel()
     return (limit - values) * (1 if surface.upper else -1)
 
@@ -101,9 +110,9 @@ def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[
     ).ravel()
     slopes = path.start_velocity * path.duration, path.goal_velocity * path.duration
     places = cubic_spline(path.fractions, path.position, slopes)(at)
-    problem, found = replace(problem, start_time=begin), []
+    found = []
     for surface in _surfaces(problem):
-        broken = -room(problem, path, surface, at, places)
+        broken = -room(problem, path, surface, at, places, begin)
         scale = float(np.ptp(broken))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], broken > PIERCED * scale, [0]])))
         for first, last in edges.reshape(-1, 2):
@@ -115,6 +124,10 @@ def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[
 
 def _surfaces(problem: TransferProblem) -> list[Surface]:
     """All limits on positions."""
+    return remembered(lambda: _all_surfaces(problem), "surfaces", problem.constraints, problem.dimension)
+
+
+def _all_surfaces(problem: TransferProblem) -> list[Surface]:
     found, axes = [], problem.dimension
     q = ca.SX.sym("q", axes)
     for i, constraint in enumerate(problem.constraints):
