@@ -75,6 +75,11 @@ class Attempt:
             for problem, leg, begin in zip(stretches, path.legs, path.begins, strict=True)
         ]
 
+    @property
+    def largest_error(self) -> float:
+        """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
+        return max(float(each.sum()) for each in self.errors)
+
 
 class Climb:
     """The attempts at one mission, in their order."""
@@ -210,14 +215,14 @@ class Climb:
         Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
         by about the part `still` of it.
         """
-        error, errors = None, attempt.errors
+        error: Error | None = None
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
             rest = left_after(changes) if changes else 0.0
-            if tol is None and _largest(errors) <= accurate and rest <= still:
+            if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
-            onto = attempt.path.finer(errors)
+            onto = attempt.path.finer(attempt.errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)
@@ -226,9 +231,9 @@ class Climb:
             if not found.solved:
                 break
             changes.append(_change(attempt, found))
-            attempt, errors = found, found.errors
+            attempt = found
             if tol is not None:
-                error = self._error(attempt, changes, _largest(errors))
+                error = self._error(attempt, changes, attempt.largest_error)
                 self.levels[-1] = replace(self.levels[-1], error=error.largest)
                 if error.largest <= tol:
                     return attempt, error, True
@@ -242,10 +247,6 @@ class Climb:
         if found.solved or found.answer.status == "stopped" or most is not None:
             return found
         return self.attempt(cold(onto), carried=True)
-
-    def largest_error(self, attempt: Attempt) -> float:
-        """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
-        return _largest(attempt.errors)
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
@@ -287,10 +288,6 @@ def solve_mission(
         if steps is not None and tol is None:
             return answered(climb, first)
         return answered(climb, *climb.refined(first, tol), tol)
-
-
-def _largest(errors: list[np.ndarray]) -> float:
-    return max(float(each.sum()) for each in errors)
 
 
 def _change(coarse: Attempt, fine: Attempt) -> float:

@@ -261,7 +261,7 @@ def _of_high_order(
     climb: Climb, problem: TransferProblem, attempt: Attempt, found: MissionSolution, tol: float | None
 ) -> tuple[Attempt, MissionSolution]:
     """The attempt and the answer on meshes of high order, where those it was found on are not fine enough."""
-    if climb.largest_error(attempt) <= (ACCURATE if tol is None else tol):
+    if attempt.largest_error <= (ACCURATE if tol is None else tol):
         return attempt, found
     course = Course.of(found.legs)
     path = attempt.path
