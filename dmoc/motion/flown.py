@@ -2,11 +2,11 @@
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
 equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
-within the limit: the polynomial drawn towards its mean, which is right where a thrust at its limit turns; two
-constant pieces, for one switch; or the value of each node for as long as its weight, for more. Of these three
-each step has the one that keeps most of the control's first two moments about its middle, as they move the
-body. The limits are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse
-is flown that is not paid for.
+within the limit: the polynomial at the size of the limit throughout, where a thrust turns at its limit; the
+polynomial drawn towards its mean; two constant pieces, for one switch; or the value of each node for as long as
+its weight, for more. Of these four each step has the one that keeps most of the control's first two moments
+about its middle, as they move the body. The limits are convex sets: the mean of the node values with the
+scheme's weights obeys them. No impulse is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ LOOKED_AT = np.linspace(0.0, 1.0, 17)
 # Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less
 # than a hundred-thousandth.
 CLOSELY = np.linspace(0.0, 1.0, 129)
+# A thrust is at its limit at a node if it is so by this part of it [-].
+FULL = 1e-6
+# Pieces of a step in which a thrust at its limit turns: in each its size swings by less than a thousandth of
+# what it does in the whole step.
+TURNING = np.linspace(0.0, 1.0, 5)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
 # Halvings of the interval for how far apart the pieces may be: to a millionth.
@@ -96,6 +101,7 @@ def _mended(
     """The same impulse within the limit in the steps whose polynomial breaks it, by the best way for each."""
     values, kept = nodes[:, broken], ~broken
     ways = [
+        _turning(dynamics, rule, values, path.place.shape[1]),
         _drawn_in(dynamics, rule, values),
         _two_pieces(dynamics, rule, values),
         _node_pieces(dynamics, rule, values),
@@ -124,6 +130,29 @@ def _moments(rule: Scheme, bounds: np.ndarray, pieces: np.ndarray) -> np.ndarray
     places = bounds[:, :-1].T + rule.points[:, None, None] * lengths - 0.5
     powers = np.stack([places, places**2])
     return np.einsum("j,kn,ajkn,jkns->ans", rule.weights, lengths, powers, pieces)
+
+
+def _turning(
+    dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The polynomial of a force of `axes`, scaled to the limit throughout, in pieces; else the mean.
+
+    Its impulse differs from that of the discrete equations by as little as the scheme errs, which is added to
+    all of it. Where the limit would then be broken, the control is something else than a thrust that turns.
+    """
+    limit = dynamics.actuator.main_limit() or 0.0
+    mean = np.einsum("j,jkn->kn", rule.weights, values)
+    lengths = np.diff(TURNING)
+    at = TURNING[:-1] + rule.points[:, None] * lengths
+    pieces = np.einsum("pj,jkn->pkn", rule.values_at(at.ravel()), values).reshape(*at.shape, *mean.shape)
+    sizes = np.linalg.norm(pieces[..., :axes], axis=-1, keepdims=True)
+    pieces[..., :axes] *= limit / np.maximum(sizes, FULL * limit)
+    pieces += mean - np.einsum("j,i,jikn->kn", rule.weights, lengths, pieces)
+    inside = np.einsum("pj,jikn->pikn", rule.values_at(LOOKED_AT), pieces)
+    turns = (np.abs(np.linalg.norm(values[..., :axes], axis=-1) - limit) <= FULL * limit).all(axis=0)
+    turns &= _beyond(dynamics, inside).max(axis=(0, 1)) <= BREAKS * limit
+    bounds = np.broadcast_to(TURNING, (len(mean), len(TURNING)))
+    return bounds, np.where(turns[:, None], pieces, mean)
 
 
 def _drawn_in(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -85,6 +85,28 @@ def test_a_thrust_at_its_limit_that_turns_keeps_nearly_all_of_its_polynomial():
     assert np.linalg.norm(known.sampled(33)[1], axis=1).max() <= 1.0
 
 
+@pytest.mark.parametrize("order, turn", [(6, 0.4), (8, 0.8)])
+def test_a_thrust_at_its_limit_turns_at_its_limit(order, turn):
+    """The polynomial through its nodes swings about the limit; what is flown hardly does, with its impulse."""
+    angle = turn * np.pi * scheme(order).points
+    controls = np.column_stack([np.cos(angle), np.sin(angle)])
+    problem = TransferProblem(1.0, REST, State((1, 0), (0, 0)), 2.0, actuator=BallForce(1.0))
+    path = path_with(order, controls)
+    known, polynomial = (
+        flown(Dynamics.of(replace(problem, actuator=one)), path) for one in (BallForce(1.0), FreeForce())
+    )
+    assert known.broken.all() and len(known.mesh) == 5
+    assert impulse(known) == pytest.approx(impulse(polynomial), abs=1e-14)
+
+    def off(one):
+        fractions, values = one.sampled(33)
+        true = np.column_stack([np.cos(turn * np.pi * fractions), np.sin(turn * np.pi * fractions)])
+        return np.abs(np.linalg.norm(values, axis=1) - 1.0).max(), np.abs(values - true).max()
+
+    assert off(polynomial)[0] > 9e-4 > 5 * off(known)[0]
+    assert off(known)[1] < off(polynomial)[1]
+
+
 def test_of_a_moment_that_nothing_has_within_the_limit_the_most_is_kept():
     rule = scheme(4)
     matrix = np.vstack([rule.weights, rule.weights * (rule.points - 0.5)])
