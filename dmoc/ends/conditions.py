@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short
+from dmoc.basics.memory import remembered
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
@@ -79,7 +80,10 @@ class Condition(Boundary):
         n = self.dimension
         given = ca.SX.sym("t"), ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("m")
         remedy = "it must take (t, q, v, m) as CasADi expressions and give one or a list of them"
-        count = tried(f"Condition {self.name!r}: function", self.function, list(given), remedy)
+        name = f"Condition {self.name!r}: function"
+        count = remembered(
+            lambda: tried(name, self.function, list(given), remedy), "tried", name, self.function, n
+        )
         if isinstance(self.scale, tuple) and len(self.scale) != count:
             raise ValueError(
                 f"Condition {self.name!r}: scale has {len(self.scale)} entries but the function gives {count} "
