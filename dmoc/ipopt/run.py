@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import short
+from dmoc.basics.numerics import in_plain_memory
 
 
 class Status(NamedTuple):
@@ -160,7 +161,7 @@ def run(solver: ca.Function, rounding: float = 0.0, **given: np.ndarray) -> Answ
     `rounding` is by how much rows may be off by rounding alone [-].
     """
     begun = time.perf_counter()
-    result, stats = _evaluated(solver, given)
+    result, stats = in_plain_memory(solver, given)
     seconds = time.perf_counter() - begun
     x, lam_x, lam_g, g = (result[key] for key in ("x", "lam_x", "lam_g", "g"))
     calls = sum(count for name, count in stats.items() if name.startswith("n_call_nlp"))
@@ -168,32 +169,6 @@ def run(solver: ca.Function, rounding: float = 0.0, **given: np.ndarray) -> Answ
     if stats["return_status"] == STALLED and _is_settled(stats["iterations"], rounding):
         status = "solved"
     return Answer(x, lam_x, lam_g, g, float(result["f"][0]), status, int(stats["iter_count"]), calls, seconds)
-
-
-def _evaluated(
-    solver: ca.Function, given: dict[str, np.ndarray]
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The outputs of `nlpsol` and its statistics, by way of plain memory.
-
-    To copy arrays into CasADi's matrices and back takes a tenth of the time of a small solve.
-    """
-    buffer, evaluate = solver.buffer()
-    outputs = {name: np.empty(solver.nnz_out(i)) for i, name in enumerate(solver.name_out())}
-    # What is not given is zero. The arrays must live as long as the buffer looks at them.
-    inputs = {
-        i: np.ascontiguousarray(np.broadcast_to(given[name], solver.nnz_in(i)), float)
-        for i, name in enumerate(solver.name_in())
-        if name in given and solver.nnz_in(i)
-    }
-    for i, values in inputs.items():
-        buffer.set_arg(i, memoryview(values))
-    for i, values in enumerate(outputs.values()):
-        if len(values):
-            buffer.set_res(i, memoryview(values))
-    evaluate()
-    if buffer.ret():
-        raise RuntimeError("CasADi cannot evaluate the solver: a function of the NLP failed")
-    return outputs, buffer.stats()
 
 
 def _is_settled(iterations: dict[str, list[float]], rounding: float) -> bool:

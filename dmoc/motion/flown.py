@@ -132,9 +132,7 @@ def _moments(rule: Scheme, bounds: np.ndarray, pieces: np.ndarray) -> np.ndarray
     return np.einsum("j,kn,ajkn,jkns->ans", rule.weights, lengths, powers, pieces)
 
 
-def _turning(
-    dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _turning(dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int) -> tuple[np.ndarray, np.ndarray]:
     """The polynomial of a force of `axes`, scaled to the limit throughout, in pieces; else the mean.
 
     Its impulse differs from that of the discrete equations by as little as the scheme errs, which is added to
