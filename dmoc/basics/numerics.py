@@ -1,4 +1,7 @@
-"""A cubic spline, motion with an error estimate, a root, the chain rule: importing SciPy takes longer."""
+"""A cubic spline, motion with an error estimate, a root, the chain rule, functions in plain memory.
+
+Importing SciPy takes longer.
+"""
 
 from __future__ import annotations
 
