@@ -1,12 +1,12 @@
-"""Break the mechanics, the checks and the nonlinear programme in one place at a time, and see whether a test fails.
+"""Break the mechanics, the checks and the nonlinear programme in one place at a time: does a test fail?
 
-    ./scripts/run python scripts/mutants.py calls FILE               # which test calls which function; half an hour
-    ./scripts/run python scripts/mutants.py run FILE --count 120     # a sample, at most a minute and a half each
+    ./scripts/run python scripts/mutants.py calls FILE              # which test calls what, half an hour
+    ./scripts/run python scripts/mutants.py run FILE --count 120    # a sample, up to 90 s each
 
-A mutant swaps an operator or a comparison, changes a number, turns a condition round or leaves out a minus. It is
-judged by tests that call the function it is in, those of its own folder first, then the quickest, until a test
-fails. The sample is the same for the same seed and the same code. All of it happens in a copy. What survives is
-printed at the end: each is either a missing test or another way to write the same.
+A mutant swaps an operator or a comparison, changes a number, turns a condition round or leaves out a minus. It
+is judged by tests that call the function it is in, those of its own folder first, then the quickest, until a
+test fails. The sample is the same for the same seed and the same code. All of it happens in a copy. What
+survives is printed at the end: each is either a missing test or another way to write the same.
 """
 
 from __future__ import annotations
@@ -30,7 +30,18 @@ ROOT = Path(__file__).resolve().parents[1]
 # What is broken, and the tests that may notice.
 FOLDERS = ("motion", "checks", "nlp")
 TESTS = (
-    *("checks", "motion", "nlp", "verification", "results", "bodies", "solver", "links", "missions", "diagnosis"),
+    *(
+        "checks",
+        "motion",
+        "nlp",
+        "verification",
+        "results",
+        "bodies",
+        "solver",
+        "links",
+        "missions",
+        "diagnosis",
+    ),
     *("exports", "effects", "scene", "guess", "rungs", "meshes", "parts", "sensitivity", "teams", "structure"),
 )
 # A mutant is judged by tests that take so many seconds in all, and is dead if they take more than the second.
@@ -132,7 +143,9 @@ def break_at(node: ast.AST) -> None:
         )
     elif isinstance(node, ast.Constant):
         value = node.value
-        node.value = not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else value * 1.5
+        node.value = (
+            not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else value * 1.5
+        )
 
 
 def judges(calls: list, file: str, tree: ast.AST, line: int) -> list[str]:
@@ -175,7 +188,8 @@ def run(calls_file: Path, seed: int, count: int, until: str) -> None:
             tests = judges(calls, name, tree, line)
             before = ast.unparse(node)
             break_at(node)
-            told = f"{name}:{line} {before[:50]!r} -> {ast.unparse(node)[:50]!r}: {text.splitlines()[line - 1].strip()}"
+            told = f"{name}:{line} {before[:50]!r} -> {ast.unparse(node)[:50]!r}"
+            told += f": {text.splitlines()[line - 1].strip()}"
             file.write_text(ast.unparse(ast.fix_missing_locations(tree)))
             verdict = judged(copy, tests)
             file.write_text(text)

@@ -16,8 +16,8 @@ from dmoc.scene.problem import TransferProblem
 SAMPLED = 400
 # The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
-# Where the cost is no line in the force, a limit above this many times what moves the body, or holds it up, is no
-# unit of force [-]: at 1e5 N for 1e-5 N the barrier ended at eight times the least effort, as good as zero.
+# A limit above this many times what moves or holds a body up is no unit of force [-], unless the cost is linear
+# in it: at 1e5 N for 1e-5 N the barrier ended at eight times the least effort, as good as zero.
 FAR_ABOVE = 100.0
 # An answer that takes less than this part of the unit of force, or of torque, is worth a second run [-].
 HARDLY = 1e-2
@@ -106,12 +106,12 @@ def _limits(
     if all(within) or has_linear_controls(problem):
         return limits
     force, torque = held_up(problem, guess)
-    most = max(typical, force), max(turning, torque, force * length)
-    enough = [
-        None if limit is None else min(limit, FAR_ABOVE * needed) if needed else limit
-        for limit, needed in zip(limits, most, strict=True)
-    ]
-    return enough[0], enough[1]
+    needs = max(typical, force), max(turning, torque, force * length)
+    force_limit, torque_limit = (
+        limit if limit is None or not need else min(limit, FAR_ABOVE * need)
+        for limit, need in zip(limits, needs, strict=True)
+    )
+    return force_limit, torque_limit
 
 
 def _torque(problem: TransferProblem, guess: DiscretePath, without: float, limit: float | None) -> float:

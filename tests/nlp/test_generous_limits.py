@@ -1,7 +1,8 @@
 """A limit that is far above what a transfer takes changes nothing but what the limit forbids.
 
-Pass criterion: the optimum without the limit to 1e-6, and every check holds. With the limit for a unit of force, one
-of 1e5 N for a transfer that takes 1e-5 N led to half of the best duration and eight times the least effort.
+Pass criterion: the optimum without the limit to 1e-6, and every check holds. With the limit for a unit of
+force, one of 1e5 N for a transfer that takes 1e-5 N led to half of the best duration and eight times the least
+effort.
 """
 
 from dataclasses import replace
@@ -14,7 +15,6 @@ from dmoc import (
     Attitude,
     BallForce,
     BoxForce,
-    KeepOut,
     Leg,
     Mission,
     State,
