@@ -1,4 +1,4 @@
-"""Coasts: where a body gets without thrust, and between two impulses."""
+"""Coasts: where a body gets without thrust, and between two impulses; what it takes to hold it or to turn it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.configurations.acting import point_function
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.base import Conservative
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
+from dmoc.motion.scales import path_scales
 from dmoc.scene.problem import TransferProblem
 
 # A coast is followed at this many places at least; between them it is interpolated linearly.
@@ -28,6 +31,8 @@ MANY_TURNS = 3
 # orbit that changes evenly leads to the same answer sooner. Coarse meshes and the solver's tolerance follow the
 # revolutions, too, whose rounding adds up.
 VERY_MANY_TURNS = 8
+# What holds a body up is estimated in this many places of a path.
+HELD_UP_AT = 20
 # The half of an ellipse between two orbits is laid so many times through where the coast before it ends.
 PASSES = 3
 
@@ -165,3 +170,26 @@ def with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
         flow = np.interp(path.fractions, 0.5 * (path.mesh[1:] + path.mesh[:-1]), flow)
     burnt = path.duration * np.cumsum(weights * flow)
     return replace(path, mass=np.maximum(problem.mass - burnt, 0.5 * problem.mass))
+
+
+def held_up(problem: TransferProblem, path: DiscretePath) -> tuple[float, float]:
+    """About the largest force [N] and torque [N m] that undo what the effects of a scene do along a path."""
+    if not problem.effects:
+        return 0.0, 0.0
+    some = np.linspace(0, len(path.position) - 1, min(len(path.position), HELD_UP_AT)).astype(int)
+    times = problem.start_time + path.duration * path.fractions[some]
+    position, mass = path.position[some], path.mass[some]
+    velocity = np.gradient(position, times, axis=0)
+    acting = point_function(problem.effects, configuration_of(problem), kinetic=False)
+    pull, _, push = (
+        np.array(ca.densify(part)) for part in acting(times[None], position.T, velocity.T, mass[None])
+    )
+    load = np.nan_to_num(np.abs(pull + push) * mass, posinf=0.0).max(axis=1)
+    places = path.coordinates.places
+    return float(load[places].max(initial=0.0)), float(load[~places].max(initial=0.0))
+
+
+def turning_torque(problem: TransferProblem, path: DiscretePath) -> float:
+    """The torque that turns the body as far as a path does, or as fast as it turns at an end [N m]."""
+    scales = path_scales(path)
+    return float(problem.moment * max(scales.turn / path.duration, scales.rate) / path.duration)

@@ -7,7 +7,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.memory import remembered
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.past_zones import has_sides
 from dmoc.motion.path import DiscretePath
@@ -178,14 +177,8 @@ def barrier_from(problem: TransferProblem, guess: DiscretePath) -> dict[str, Any
     """
     if not problem.limited or problem.turns or problem.free_duration or problem.actuator.smoothing is not None:
         return {}
-    parts = problem.actuator, problem.objective, problem.effects, problem.dimension
-    plain = remembered(lambda: _has_plain_controls(problem), "plain controls", *parts)
-    if not plain or has_sides(problem, guess):
+    if problem.actuator.rows(ca.SX.sym("u", problem.controls)) or has_linear_controls(problem):
+        return {}
+    if has_sides(problem, guess):
         return {}
     return {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
-
-
-def _has_plain_controls(problem: TransferProblem) -> bool:
-    """Whether the cost is curved in all controls, and their limits are plain numbers."""
-    rows = problem.actuator.rows(ca.SX.sym("u", problem.controls))
-    return not rows and not has_linear_controls(problem)

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.digits import time_unit
+from dmoc.basics.memory import remembered
 from dmoc.configurations.acting import state_symbols
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
@@ -95,8 +96,13 @@ def _linear(problem: TransferProblem, size: int) -> np.ndarray:
     limited = np.isfinite(upper - lower)
     if not limited.any():
         return limited
-    u = ca.SX.sym("u", size)
-    return limited & (ca.hessian(_rate(problem, u), u)[0].nnz() == 0)
+
+    def is_curved() -> bool:
+        u = ca.SX.sym("u", size)
+        return ca.hessian(_rate(problem, u), u)[0].nnz() > 0
+
+    parts = problem.actuator, problem.objective, problem.dimension, size
+    return limited & (not remembered(is_curved, "curved cost", *parts))
 
 
 def _rate(problem: TransferProblem, u: ca.SX) -> ca.SX:

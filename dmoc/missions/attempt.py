@@ -1,0 +1,53 @@
+"""One attempt at a mission, as a value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dmoc.chains.path import MissionPath
+from dmoc.chains.program import MissionProgram
+from dmoc.ipopt.run import Answer
+from dmoc.motion.dynamics import Dynamics
+from dmoc.nlp.units import outgrown
+from dmoc.results.estimate import local_errors
+from dmoc.results.facts import Level
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One run of Ipopt on one set of meshes."""
+
+    program: MissionProgram
+    answer: Answer
+    level: Level
+
+    @property
+    def solved(self) -> bool:
+        return self.answer.status == "solved"
+
+    @property
+    def outgrown(self) -> bool:
+        """Whether the answer of a leg takes far less than its units were made for."""
+        each = zip(self.program.legs, self.path.legs, strict=True)
+        return any(outgrown(placed.program.problem, placed.program.units, leg) for placed, leg in each)
+
+    @cached_property
+    def path(self) -> MissionPath:
+        return self.program.path(self.answer)
+
+    @cached_property
+    def errors(self) -> list[np.ndarray]:
+        """The error of every step of each leg, of extent and speed [-]."""
+        path, stretches = self.path, self.program.mission.stretches
+        return [
+            local_errors(Dynamics.of(problem), leg, begin)
+            for problem, leg, begin in zip(stretches, path.legs, path.begins, strict=True)
+        ]
+
+    @property
+    def largest_error(self) -> float:
+        """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
+        return max(float(each.sum()) for each in self.errors)
