@@ -125,10 +125,8 @@ def unassembled(problem: TransferProblem, path: DiscretePath, units: Units) -> t
     placed = Placement(problem, stencils, rule, path.hold, path.mesh, units)
     derivatives: Any = None
     layouts = placed.columns, placed.rows, placed.row_bounds
-    dynamics = Dynamics.of(problem)
-    none = derivatives, np.empty(0)
-    nlp = NLP(problem, dynamics, rule, path.hold, path.mesh, units, *layouts, *none)
-    return nlp, placed.blocks
+    parts = units, *layouts, derivatives, np.empty(0)
+    return NLP(problem, Dynamics.of(problem), rule, path.hold, path.mesh, *parts), placed.blocks
 
 
 def check_mesh(steps: int | None, mesh: Any = None) -> np.ndarray:
