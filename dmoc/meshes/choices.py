@@ -259,6 +259,8 @@ def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tu
 def best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:
     """The order that pays for a tolerance, by an answer on a coarse mesh and its objective, and why."""
     if path.hold:
+        if is_uneven(problem, path):
+            return ORDER_OF_UNEVEN, "held forces, and motion that is fast near an attractor"
         return 2, "held forces are second order whatever the scheme"
     if is_singular(problem, path):
         return 2, "controls stay between their limits where no cost decides on them"

@@ -29,7 +29,7 @@ from dmoc.rungs.rung import Rung, at_rest
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import Ladder
-from dmoc.solver.mended import on_shorter_steps, past_zones
+from dmoc.solver.mended import goal_missed, on_shorter_steps, past_zones
 from dmoc.solver.second_look import cheaper_revolutions
 
 # Refinement ends on a mesh of more nodes than this, which bounds time and memory.
@@ -68,6 +68,8 @@ LONGEST_FREE = 150
 TIGHTER = 10.0
 # A mesh does no better if its change is more than this part of the one before [-]: estimates go up and down.
 FALLING = 0.95
+# What a user is told of them.
+ALIKE = "; paths that differ by {:.1g} of the extent cost the same"
 # After this many meshes that do no better the best one is the answer: steps have come down to rounding.
 PATIENCE = 2
 
@@ -160,6 +162,7 @@ class _Refinement:
             now, least = (fine, rung.level.objective), NOTHING * rung.nlp.units.cost
             self.changes.append(change(self.problem, (coarse, cost), now, parts, least))
             self._hold_if_flat(rung)
+            self._settle_if_alike(fine)
             if rung.pinned and not self.flat:
                 self.flat = True
                 self.reason += "; durations cost the same, one was kept"
@@ -199,6 +202,17 @@ class _Refinement:
         if self.linear and moved > self.tol and flat:
             tighter = TIGHTER * self.lean if wanders and cost < SAME_COST * self.tol else self.lean
             self.lean = max(tighter, min(HELD * self.tol, MOST_HELD))
+
+    def _settle_if_alike(self, path: DiscretePath) -> None:
+        """Where paths wander from mesh to mesh and cost the same, take one by how well it is flown.
+
+        No mesh tells such paths apart, so that their changes are no errors of the mesh.
+        """
+        (before, first), (moved, cost) = self.changes[-2:] if len(self.changes) > 1 else ((0.0, 1.0),) * 2
+        wanders = self.tol < moved and before < LEAST_FALL * moved
+        if self.linear and wanders and max(first, cost) < SAME_COST * self.tol:
+            self.changes[-1] = (goal_missed(self.ladder, path), cost)
+            self.reason += ALIKE.format(moved)
 
     def _cuts(self, path: DiscretePath, objective: float, longest: float) -> tuple[np.ndarray, float]:
         """Into how many parts to cut each step, and by how much the error falls then at most.
@@ -241,19 +255,22 @@ class _Refinement:
         moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))
         if moved[1] > SAME_COST * self.tol:
             self.changes[-1] = (self.changes[-1][0] + moved[0], self.changes[-1][1] + moved[1])
-        elif moved[0] > self.tol:
-            self.reason += f"; paths that differ by {moved[0]:.1g} of the extent cost the same"
+        elif moved[0] > self.tol and ALIKE[-8:] not in self.reason:
+            self.reason += ALIKE.format(moved[0])
         return found
 
     def _sharpen(self, rung: Rung, most: float) -> None:
         """Where the rounding of |F| alone costs more than the tolerance, round it less on the same mesh."""
         width = self.problem.actuator.smoothing
         while width is not None and self._rounded_too_much() and width > LEAST_ROUNDING:
-            share = 0.5 * ROUNDING_SHARE * self.tol / self.rounded
-            width = max(width * min(max(share, 0.1), 0.5), LEAST_ROUNDING)
-            sharper = self.ladder.try_on(rung.path, width, MOST_SHARPENING)
+            share = min(max(0.5 * ROUNDING_SHARE * self.tol / self.rounded, 0.1), 0.5)
+            for less in (share, share**0.5):
+                sharper = self.ladder.try_on(rung.path, max(width * less, LEAST_ROUNDING), MOST_SHARPENING)
+                if sharper.solved or sharper.stopped:
+                    break
             if not sharper.solved:
                 return
+            width = sharper.problem.actuator.smoothing
             rung, self.problem = sharper, sharper.problem
             self._judge(rung, rung.path, most)
             self.reason += f"; |F| rounded over {width:.0e} of the largest thrust"
