@@ -45,7 +45,7 @@ MOST_SOUNDING = 60
 # The duration of the best answer is freed if that may save more than this part of the objective, to first order
 # [-].
 NOTHING_TO_GAIN = 1e-9
-# Where an attempt leads away from a path that is nearly an answer, that is held as strongly as this [-], one after the other.
+# Where freeing the duration leads nowhere, the path is held as strongly as this [-], one after the other.
 HELD = (1e-2, 1e-4, 1e-6)
 # The problem itself is solved on a coarse mesh from this many of the durations, the most promising ones.
 MOST_SOLVED = 3

@@ -32,6 +32,9 @@ MISSION = "dmoc mission"
 TEAM = "dmoc team"
 # Below this tolerance [-] structure pays by itself: steps cut at switches reach it in seconds, and hardly more.
 TIGHT = 1e-5
+# With a free duration it pays up to this one [-]: paths that differ in it cost the same, and steps are cut for
+# minutes where legs take seconds.
+TIGHT_IF_FREE = 1e-4
 
 
 @overload
@@ -115,7 +118,8 @@ def solve(
     nothing switches, so that the full order of the scheme is had. `order` and `steps` are then those of the
     coarse answer. The answer is a MissionSolution; where that does not succeed, or there is one arc alone, it
     is as without. Where a tolerance below 1e-5 is all that is asked for, and an engine or a zone may switch,
-    this is tried by itself; not with `structure=False`.
+    this is tried by itself, and for a switched engine in a free time up to a tolerance of 1e-4; not with
+    `structure=False`.
 
     Parameters
     ----------
@@ -204,12 +208,13 @@ def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
     if (
         hold is not False
         or any(part is not None for part in chosen)
-        or not (isinstance(tol, float) and 0 < tol < TIGHT)
+        or not (isinstance(tol, float) and 0 < tol <= TIGHT_IF_FREE)
+        or not (tol < TIGHT or getattr(problem, "free_duration", False))
     ):
         return False
-    from dmoc.structure.solve import has_switches
+    from dmoc.structure.solve import can_be_parted, has_switches, is_switched
 
-    return has_switches(problem)
+    return has_switches(problem) if tol < TIGHT else is_switched(problem) and can_be_parted(problem)
 
 
 def _by_structure(
