@@ -79,8 +79,9 @@ def _solved(
     problem = ladder.problem
     # To an orbit as a whole, durations hardly differ in cost: from a long one the refinement to a tolerance
     # wanders (89 s instead of 7 s in one case), and no revolution is there to be missed.
+    # Without limits the soundings are answers, and a guess may lead to one that is a hundred times as dear.
     anchored = problem.start.anchored and problem.goal.anchored
-    tried = guess is None and mesh is None and (anchored or tol is None)
+    tried = guess is None and mesh is None and (anchored or tol is None or not problem.limited)
     best = best_revolutions(ladder, order, hold) if tried else None
     if best is not None:
         guess = best.path
