@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.basics.numerics import cubic_spline
 from dmoc.chains.path import MissionPath
 from dmoc.legs.legs import Coast, Leg
-from dmoc.missions.guess import mesh_around
+from dmoc.missions.meshes import mesh_around
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath

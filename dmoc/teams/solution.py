@@ -80,6 +80,11 @@ class TeamSolution(Outcome):
         return TeamPath(legs, begins, forces=self.forces, densities=self.densities)
 
     @property
+    def parts(self) -> tuple[Solution, ...]:
+        """The bodies, each like the solution of a transfer."""
+        return self.members
+
+    @property
     def order(self) -> int:
         return self.members[0].order
 

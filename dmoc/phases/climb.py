@@ -1,0 +1,181 @@
+"""Solve a team of missions, coarse to fine, on one mesh a phase for all its bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.guess import first_path
+from dmoc.motion.mesh import uniform_mesh
+from dmoc.phases.answer import SHORT, answered
+from dmoc.phases.cuts import phased_leaps
+from dmoc.phases.guess import SHORTEST, first_guess, flown_ways, on_clock
+from dmoc.phases.path import PhasedPath
+from dmoc.phases.program import PhasedProgram
+from dmoc.phases.solution import PhasedSolution
+from dmoc.phases.timetable import Order, Timetable, as_mission
+from dmoc.scene.team import Team
+from dmoc.solver.solve import check_numerics
+from dmoc.teams.climb import ORDER, TeamClimb
+
+# At most so many other orders of joints are tried for each of them.
+MOST_ORDERS = 2
+
+
+class PhasedClimb(TeamClimb):
+    """The attempts at one team of missions, in their order; `mission` is its timetable."""
+
+    program: Any = PhasedProgram
+
+    def cut_at_leaps(self, path: Any) -> Any:
+        steps = phased_leaps(self.mission, path)
+        return path.cut(path.mesh, steps) if any(map(len, steps)) else None
+
+    def straight(self, path: Any) -> Any:
+        given, leg = flown_ways(path), path.legs[0]
+        clock = path.begins[0] + np.append(0.0, np.cumsum(path.durations))
+        return on_clock(self.mission, given, clock, (leg.order, None, leg.hold))
+
+    def from_own_answers(self, attempt: Attempt, path: Any) -> Attempt:
+        """An answer from what every body would do by itself, if all of them have an answer, bent apart."""
+        team, own = self.mission.team, []
+        numerics = path.legs[0].order, path.legs[0].hold
+        for one, member in zip(team.members, self.mission.missions, strict=True):
+            alone = Climb(member, self.options, self.progress, self.compiled, None)
+            alone.interrupt = self.interrupt
+            found = alone.from_guess(first_path(as_mission(one), numerics[0], None, numerics[1], None))
+            if not found.solved:
+                return attempt
+            own.append(found.path.as_arrays())
+        plan, start = first_guess(team, numerics[0], None, numerics[1], own)
+        if not start.fits(self.mission):
+            return attempt
+        tried = self.from_guess(start)
+        return tried if tried.solved else attempt
+
+    def reordered(self, attempt: Attempt) -> Attempt:
+        """An answer in which no phase between joints of two bodies is as short as it may be, if it is found.
+
+        There the joints would rather follow each other the other way round or, if they do not want that either,
+        be at one time.
+        """
+        for _ in range(MOST_ORDERS * self.mission.count):
+            path: Any = attempt.path
+            plan: Timetable = self.mission
+            short = self._short(path)
+            if not short or self.interrupt.seen:
+                break
+            for order, lasts in _other_orders(plan, path, short[0]):
+                self.mission, self.held = plan, attempt
+                tried = self._in_order(order, path, lasts)
+                if tried is not None and self._is_better(tried, attempt):
+                    found: Any = tried.path
+                    # The other way round they may end at one time as well.
+                    if found.count == plan.count and short[0] in self._short(found):
+                        continue
+                    attempt = tried
+                    break
+            else:
+                self.mission, self.held = plan, attempt
+                break
+        return attempt
+
+    def _short(self, path: Any) -> list[int]:
+        """The phases between joints of two bodies that are as short as they may be."""
+        plan: Timetable = self.mission
+        return [i for i in plan.between if path.durations[i] <= SHORT * plan.bounds[i, 0]]
+
+    def _in_order(self, order: Order, path: PhasedPath, lasts: np.ndarray) -> Attempt | None:
+        """The answer with joints in another order, from a path; None if there is none."""
+        other = Timetable(self.mission.team, order)
+        if not other.possible:
+            return None
+        lasts = np.clip(lasts, *other.bounds.T)
+        clock = path.begins[0] + np.append(0.0, np.cumsum(lasts))
+        leg = path.legs[0]
+        start = on_clock(other, flown_ways(path), clock, (leg.order, None, leg.hold))
+        self.mission = other
+        tried = self.from_guess(start)
+        return tried if tried.solved else None
+
+    def _is_better(self, tried: Attempt, attempt: Attempt) -> bool:
+        sense = self.mission.objective.sense
+        before = sense * attempt.level.objective
+        return sense * tried.level.objective <= before + 1e-6 * abs(before)
+
+
+def _other_orders(plan: Timetable, path: PhasedPath, short: int) -> list[tuple[Order, np.ndarray]]:
+    """The two joints around a short phase the other way round, and at one time, with durations of phases."""
+    groups, lasts = list(plan.order), path.durations
+    swapped = [*groups[: short - 1], groups[short], groups[short - 1], *groups[short + 1 :]]
+    longer = lasts.copy()
+    longer[short] = max(lasts[short], SHORTEST * lasts.sum())
+    one = [*groups[: short - 1], groups[short - 1] + groups[short], *groups[short + 1 :]]
+    return [(tuple(swapped), longer), (tuple(one), np.delete(lasts, short))]
+
+
+def solve_phased(
+    team: Team,
+    order: int | None = None,
+    steps: int | None = None,
+    tol: float | None = None,
+    hold: bool = False,
+    mesh: Any = None,
+    guess: Any = None,
+    options: dict[str, Any] | None = None,
+    progress: Any = None,
+    compiled: bool = False,
+    time_limit: float | None = None,
+) -> PhasedSolution:
+    """Solve a team of missions; the arguments are those of `dmoc.solve`, and `steps` are those of a phase."""
+    check_numerics(order, steps, tol, hold, options, progress, time_limit)
+    if mesh is not None:
+        raise ValueError("a team of missions has a mesh for each phase; give steps")
+    plan, path = first_phases(team, order, steps, hold, guess)
+    climb = PhasedClimb(plan, options, progress, compiled, time_limit)
+    with climb.interrupt:
+        first = climb.attempt(path) if path.warm else climb.from_guess(path)
+        if not (first.solved or path.warm or climb.interrupt.seen):
+            first = climb.from_own_answers(first, path)
+        if not first.solved:
+            first = climb.explained(path, first)
+        if not first.solved:
+            return answered(climb, first)
+        first = climb.reordered(first)
+        if steps is not None and tol is None:
+            return answered(climb, first)
+        found, error, met = climb.refined(first, tol)
+        found = climb.unleapt(found) if met else found
+        if found.solved and not path.warm:
+            found = climb.round_the_other_way(found, found.path)
+        return answered(climb, climb.sharpened(found) if tol is None else found, error, met, tol)
+
+
+def first_phases(
+    team: Team, order: int | None, steps: int | None, hold: bool, guess: Any = None
+) -> tuple[Timetable, PhasedPath]:
+    """The timetable and the path to start from."""
+    given = team.guess if guess is None else guess
+    given = getattr(given, "path", given)
+    if isinstance(given, PhasedPath):
+        plan = Timetable(team, given.joints)
+        if given.names != plan.names or not plan.possible or not given.fits(plan):
+            raise ValueError(
+                f"guess is of {', '.join(given.names)} with other legs than the team of {', '.join(plan.names)}; "
+                "give an answer of this team, or one guess a body"
+            )
+        if order is None and steps is None:
+            return plan, given
+        meshes = [
+            (mesh if steps is None else uniform_mesh(steps), order or given.legs[0].order) for mesh in given.mesh
+        ]
+        return plan, given.onto(meshes)
+    return first_guess(team, order or _own_order(team), steps, hold, given)
+
+
+def _own_order(team: Team) -> int:
+    """The largest order that a leg asks for, or the usual one."""
+    asked = [leg.order for one in team.members for leg in getattr(one, "plan", ()) if leg.order]
+    return max(asked, default=ORDER)
