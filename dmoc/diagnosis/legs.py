@@ -188,7 +188,9 @@ def _of_pairs(program: Any) -> list[Yielding]:
     for name, (part, a, b) in zip(program.mission.pair_names(), program.mission.pairs(), strict=True):
         if part.distance_kept:
             # A team of missions has a group of rows for each phase.
-            groups = [one for one in program.rows.groups if one.name == name or one.name.startswith(f"{name} in ")]
+            groups = [
+                one for one in program.rows.groups if one.name == name or one.name.startswith(f"{name} in ")
+            ]
             places = program.first_row + np.concatenate([np.arange(one.start, one.stop) for one in groups])
             both = f"between {program.mission.names[a]} and {program.mission.names[b]}"
             words = _of_pair(part, both)

@@ -53,7 +53,9 @@ def straightened(climb: Any, attempt: Any, most: int) -> Any:
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:
     mission, program, answer = climb.mission, attempt.program, attempt.answer
     path, status = attempt.path, answer.status
-    made = mission_solution(mission, path, costs_of(program, answer.x), attempt.level.objective, status, climb.levels)
+    made = mission_solution(
+        mission, path, costs_of(program, answer.x), attempt.level.objective, status, climb.levels
+    )
     steps = ", ".join(str(leg.steps) for leg in made.legs)
     if status == "solved":
         message, success = made.message, True
@@ -79,7 +81,12 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
 
 
 def mission_solution(
-    mission: Mission, path: MissionPath, costs: np.ndarray, objective: float, status: str, levels: Sequence[Level]
+    mission: Mission,
+    path: MissionPath,
+    costs: np.ndarray,
+    objective: float,
+    status: str,
+    levels: Sequence[Level],
 ) -> MissionSolution:
     """A path as the solution of a mission; `costs` are those of its legs, as they are minimised."""
     unit = mission.objective.unit_with(mission.actuator)

@@ -16,8 +16,7 @@ from dmoc.ipopt.run import Answer, Interrupt, Watch
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.drops import with_best_drops
-from dmoc.missions.guess import first_path
-from dmoc.missions.meshes import meshes_along
+from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss

@@ -26,7 +26,12 @@ class BetweenMissions(BetweenBodies):
     """
 
     def __init__(
-        self, plan: Timetable, legs: Sequence[Placed], first_row: int, fixed: np.ndarray, kicks: Sequence[np.ndarray]
+        self,
+        plan: Timetable,
+        legs: Sequence[Placed],
+        first_row: int,
+        fixed: np.ndarray,
+        kicks: Sequence[np.ndarray],
     ):
         self.team: Any = plan
         self.plan, self.first_row, self._fixed, self.kicks = plan, first_row, fixed, kicks
@@ -46,7 +51,9 @@ class BetweenMissions(BetweenBodies):
                     at = np.vstack([self._places(a), self._places(b)])
                     # Where phases meet the bodies are in one place, whose row is that of the phase before.
                     late = 1 if phase else 0
-                    self._add(name + suffix(phase), "node", rows, at, made, self._origin(b) - self._origin(a), late)
+                    self._add(
+                        name + suffix(phase), "node", rows, at, made, self._origin(b) - self._origin(a), late
+                    )
         self._meet(apart, places, origin)
         self._clock()
 
@@ -78,17 +85,29 @@ class BetweenMissions(BetweenBodies):
         if not (spans := plan.rows):
             return
         lasts = ca.SX.sym("T", len(free))
-        total = [ca.sum1(lasts[[i for i, at in enumerate(free) if span.first <= at <= span.last]]) for span in spans]
+        total = [
+            ca.sum1(lasts[[i for i, at in enumerate(free) if span.first <= at <= span.last]]) for span in spans
+        ]
         rows = []
         for span, sum_of in zip(spans, total, strict=True):
             given = float(np.nansum(plan.known[span.first : span.last + 1]))
-            rows.append(Row(f"phases {span.first + 1} to {span.last + 1}", sum_of, span.shortest - given, span.longest - given, "s"))
+            rows.append(
+                Row(
+                    f"phases {span.first + 1} to {span.last + 1}",
+                    sum_of,
+                    span.shortest - given,
+                    span.longest - given,
+                    "s",
+                )
+            )
         at = np.concatenate([first[phase].at("duration", 0) for phase in free])
         self._add(SPANS, "end", rows, at[:, None], self._kernel(SPANS, lasts, ca.SX(0, 1), rows), np.empty(0))
 
     def _alike(self, name: str, unknown: Callable) -> None:
         """Rows by which an unknown of every other body is that of the first one."""
         values = ca.SX.sym("T", len(self.grid))
-        rows = [Row(other, values[i + 1] - values[0], 0.0, 0.0, "s") for i, other in enumerate(self.plan.names[1:])]
+        rows = [
+            Row(other, values[i + 1] - values[0], 0.0, 0.0, "s") for i, other in enumerate(self.plan.names[1:])
+        ]
         at = np.concatenate([unknown(mine) for mine in self.grid])
         self._add(name, "end", rows, at[:, None], self._kernel("alike", values, ca.SX(0, 1), rows), np.empty(0))

@@ -53,7 +53,11 @@ def verify_phased(solution: PhasedSolution, problem: Any = None, more: Sequence 
         path = solution.path
         whole = Whole(solution, PhasedProgram.of(plan, plan.stretches, path), path)  # type: ignore[arg-type]
         checks += [whole.joints(), _together(plan, path, legs), whole.optimality()]
-        primers = [(primer_check(one), name) for one, name in zip(solution.members, plan.names, strict=True) if one.impulses]
+        primers = [
+            (primer_check(one), name)
+            for one, name in zip(solution.members, plan.names, strict=True)
+            if one.impulses
+        ]
         if primers:
             worst, name = max(primers, key=lambda pair: pair[0].value or 0.0)
             checks.append(replace(worst, note=f"{name}: {worst.note}"))

@@ -1,7 +1,8 @@
-"""Solve a team of missions, coarse to fine, on one mesh a phase for all its bodies."""
+"""Solve a team of missions, coarse to fine, on one mesh a phase for all its bodies; from several guesses, too."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,17 @@ from dmoc.motion.mesh import uniform_mesh
 from dmoc.phases.answer import SHORT, answered
 from dmoc.phases.cuts import phased_leaps
 from dmoc.phases.guess import SHORTEST, first_guess, flown_ways, on_clock
+from dmoc.phases.order import Order, as_mission
 from dmoc.phases.path import PhasedPath
 from dmoc.phases.program import PhasedProgram
 from dmoc.phases.solution import PhasedSolution
-from dmoc.phases.timetable import Order, Timetable, as_mission
+from dmoc.phases.timetable import Timetable
 from dmoc.scene.team import Team
 from dmoc.solver.solve import check_numerics
+from dmoc.solver.starts import Optimum
+from dmoc.teams import optima as of_transfers
 from dmoc.teams.climb import ORDER, TeamClimb
+from dmoc.teams.guess import bent_apart, other_sides
 
 # At most so many other orders of joints are tried for each of them.
 MOST_ORDERS = 2
@@ -34,9 +39,12 @@ class PhasedClimb(TeamClimb):
         return path.cut(path.mesh, steps) if any(map(len, steps)) else None
 
     def straight(self, path: Any) -> Any:
-        given, leg = flown_ways(path), path.legs[0]
+        plan, leg = self.mission, path.legs[0]
+        _, start = first_guess(plan.team, leg.order, None, leg.hold, bent=False)
+        if start.joints == plan.order:
+            return start
         clock = path.begins[0] + np.append(0.0, np.cumsum(path.durations))
-        return on_clock(self.mission, given, clock, (leg.order, None, leg.hold))
+        return on_clock(plan, flown_ways(start), clock, (leg.order, None, leg.hold))
 
     def from_own_answers(self, attempt: Attempt, path: Any) -> Attempt:
         """An answer from what every body would do by itself, if all of them have an answer, bent apart."""
@@ -49,7 +57,7 @@ class PhasedClimb(TeamClimb):
             if not found.solved:
                 return attempt
             own.append(found.path.as_arrays())
-        plan, start = first_guess(team, numerics[0], None, numerics[1], own)
+        _, start = first_guess(team, numerics[0], None, numerics[1], own)
         if not start.fits(self.mission):
             return attempt
         tried = self.from_guess(start)
@@ -163,13 +171,14 @@ def first_phases(
         plan = Timetable(team, given.joints)
         if given.names != plan.names or not plan.possible or not given.fits(plan):
             raise ValueError(
-                f"guess is of {', '.join(given.names)} with other legs than the team of {', '.join(plan.names)}; "
-                "give an answer of this team, or one guess a body"
+                f"guess is of {', '.join(given.names)}, and its legs are not those of the team of "
+                f"{', '.join(plan.names)}; give an answer of this team, or one guess a body"
             )
         if order is None and steps is None:
             return plan, given
         meshes = [
-            (mesh if steps is None else uniform_mesh(steps), order or given.legs[0].order) for mesh in given.mesh
+            (mesh if steps is None else uniform_mesh(steps), order or given.legs[0].order)
+            for mesh in given.mesh
         ]
         return plan, given.onto(meshes)
     return first_guess(team, order or _own_order(team), steps, hold, given)
@@ -179,3 +188,47 @@ def _own_order(team: Team) -> int:
     """The largest order that a leg asks for, or the usual one."""
     asked = [leg.order for one in team.members for leg in getattr(one, "plan", ()) if leg.order]
     return max(asked, default=ORDER)
+
+
+def team_optima(
+    team: Team, starts: int, order: int | None = None, hold: bool = False, guess: Any = None
+) -> list[Optimum]:
+    """The distinct optima that `starts` guesses lead to, the best first.
+
+    The first guess is the default one; then each pair that comes near passes on its other side, in all ways;
+    then come random bends, the same ones every time.
+    """
+    if not team.phased:
+        return of_transfers.team_optima(team, starts, order, hold, guess)
+    found: list[Optimum] = []
+    plan, base = first_phases(team, order, None, hold, guess)
+    for _, (name, path) in zip(range(starts), _variants(plan, base), strict=False):
+        climb = PhasedClimb(plan, None, None, False, None)
+        with climb.interrupt:
+            tried = climb.reordered(climb.from_guess(path))
+        if tried.answer.status == "stopped":
+            break
+        if tried.solved:
+            of_transfers.put(found, Optimum(tried.level.objective, tried.path, (name,)))
+    return sorted(found, key=lambda optimum: team.objective.sense * optimum.objective)
+
+
+def _variants(plan: Any, base: PhasedPath) -> Iterator[tuple[str, PhasedPath]]:
+    """Names and guesses, the default one first."""
+    yield "default", base
+    if base.warm:
+        return
+    straight = PhasedClimb(plan, None, None, False, None).straight(base)
+    for i, sides in enumerate(other_sides(plan, straight)):
+        # The first way is the one that the default guess takes where no side is nearer.
+        if i:
+            passed = "".join("+-"[side < 0] for side in sides if side)
+            yield f"sides {passed}", bent_apart(plan, straight, sides)
+    draw, number = np.random.default_rng(0), 0
+    along = np.sin(np.pi * base.fractions)[:, None]
+    while True:
+        number += 1
+        bends = [
+            of_transfers.BENT * base.diagonal * along * draw.uniform(-1, 1, way.shape[1]) for way in base.ways
+        ]
+        yield f"random bends {number}", base.moved(bends)

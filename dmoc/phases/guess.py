@@ -13,8 +13,9 @@ from dmoc.chains.path import MissionPath
 from dmoc.missions.guess import along, guessed, likely_durations
 from dmoc.missions.meshes import mesh_around
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.phases.order import as_mission, order_by
 from dmoc.phases.path import PhasedPath
-from dmoc.phases.timetable import Timetable, as_mission, order_by
+from dmoc.phases.timetable import Timetable
 from dmoc.scene.mission import Mission
 from dmoc.scene.team import Team
 from dmoc.teams.guess import aimed, bent_apart
@@ -35,9 +36,7 @@ def first_guess(
     """A timetable, and a guess on it: each body's own, bent apart from those of the others."""
     missions, total = _aimed(team)
     parts = _each(team, given)
-    own = [
-        _own_path(mission, mine, total) for mission, mine in zip(missions, parts, strict=True)
-    ]
+    own = [_own_path(mission, mine, total) for mission, mine in zip(missions, parts, strict=True)]
     begin, total = own[0].begins[0], float(np.mean([path.duration for path in own]))
     joints = [_stretched(path, total) for path in own]
     longest = team.duration_bounds[1]

@@ -11,7 +11,8 @@ import numpy as np
 from dmoc.chains.path import MissionPath, cut_in_two
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
-from dmoc.phases.timetable import Order, Timetable, called
+from dmoc.phases.order import Order, called
+from dmoc.phases.timetable import Timetable
 from dmoc.teams.path import NOTHING, TeamPath
 
 
@@ -57,7 +58,11 @@ class PhasedPath(MissionPath):
     ) -> PhasedPath:
         """The paths of bodies beside each other; `between` are `forces` and `densities` of what joins them."""
         own, forces = (
-            {called(name, key): value for name, part in zip(names, parts, strict=True) for key, value in kind(part)}
+            {
+                called(name, key): value
+                for name, part in zip(names, parts, strict=True)
+                for key, value in kind(part)
+            }
             for kind in (lambda part: part.own.items(), lambda part: part.forces.items())
         )
         idle = tuple(called(name, key) for name, part in zip(names, parts, strict=True) for key in part.idle)
@@ -191,4 +196,3 @@ def suffix(phase: int) -> str:
 def _of_body(known: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
     start = called(name, "")
     return {key.removeprefix(start): value for key, value in known.items() if key.startswith(start)}
-

@@ -18,8 +18,9 @@ from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
 from dmoc.nlp.units import units_of
 from dmoc.phases.between import BetweenMissions
+from dmoc.phases.order import called
 from dmoc.phases.path import PhasedPath
-from dmoc.phases.timetable import Timetable, called
+from dmoc.phases.timetable import Timetable
 from dmoc.scene.problem import TransferProblem
 from dmoc.teams.program import felt
 
@@ -35,7 +36,13 @@ class Body(NamedTuple):
     def moved(self, blocks: Sequence[Block]) -> list[Block]:
         """Blocks of the body among those of all."""
         return [
-            Block(one.kernel, self.columns[one.columns], self.rows[one.targets], one.values, one.first + self.parameters)
+            Block(
+                one.kernel,
+                self.columns[one.columns],
+                self.rows[one.targets],
+                one.values,
+                one.first + self.parameters,
+            )
             for one in blocks
         ]
 
@@ -52,7 +59,11 @@ class PhasedProgram(MissionProgram):
 
     @classmethod
     def of(  # type: ignore[override]
-        cls, plan: Timetable, problems: Sequence[TransferProblem], path: PhasedPath, rounding: float | None = None
+        cls,
+        plan: Timetable,
+        problems: Sequence[TransferProblem],
+        path: PhasedPath,
+        rounding: float | None = None,
     ) -> PhasedProgram:
         """The program of a team whose legs are these problems, on the meshes of a path."""
         parts = [path.of(i) for i in range(len(plan.cut))]
@@ -156,7 +167,9 @@ class PhasedProgram(MissionProgram):
         for group in self.rows.groups:
             if group.kind == "node":
                 phase = int(group.name.rsplit(" ", 1)[1]) - 1
-                densities[group.name] = forces.pop(group.name).reshape(group.count, -1) / weights[phase][:, None]
+                densities[group.name] = (
+                    forces.pop(group.name).reshape(group.count, -1) / weights[phase][:, None]
+                )
         known = found.legs, found.begins, found.own, forces
         return PhasedPath(*known, idle=found.idle, densities=densities, names=plan.names, joints=plan.order)  # type: ignore[attr-defined]
 
@@ -222,7 +235,10 @@ def _fixed(plan: Timetable, bodies: Sequence[Body], legs: Sequence[Any]) -> np.n
             given = ~np.isnan(end.fixed()[0])
             found[at[: len(given)][given]] = True
         if not mission.joints[-1].events:
-            at, given = legs[(i + 1) * plan.count - 1].at("goal.velocity", 0), ~np.isnan(mission.goal.fixed()[1])
+            at, given = (
+                legs[(i + 1) * plan.count - 1].at("goal.velocity", 0),
+                ~np.isnan(mission.goal.fixed()[1]),
+            )
             found[at[: len(given)][given]] = True
     return found
 

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
-from dmoc.missions.solution import MissionSolution, mission_parts, mission_of
+from dmoc.missions.solution import MissionSolution, mission_of, mission_parts
+from dmoc.phases.order import Order, Place
 from dmoc.phases.path import PhasedPath
-from dmoc.phases.timetable import Order, Place, Timetable
+from dmoc.phases.timetable import Timetable
 from dmoc.results.netcdf import (
     Format,
     Table,
@@ -69,6 +70,12 @@ class PhasedSolution(TeamSolution):
         return tuple(leg for one in self.members for leg in one.legs)
 
     @property
+    def part_names(self) -> tuple[str, ...]:
+        """What the legs of all bodies are called."""
+        pairs = zip(self.names, self.members, strict=True)
+        return tuple(f"{name}, {leg.provenance.problem_name}" for name, one in pairs for leg in one.legs)
+
+    @property
     def hold(self) -> bool:
         return self.members[0].legs[0].hold
 
@@ -87,11 +94,13 @@ class PhasedSolution(TeamSolution):
         """
         of_kind("problem", problem, Team)
         sizes = [len(getattr(one, "plan", (one,))) - 1 for one in problem.members]
-        mine = [sum(place.body == i for group in self.joints for place in group) for i in range(len(self.names))]
+        mine = [
+            sum(place.body == i for group in self.joints for place in group) for i in range(len(self.names))
+        ]
         if problem.names != self.names or sizes != mine:
             raise ValueError(
-                f"team {problem.name!r} is of {', '.join(problem.names)} with {_counts(sizes)} legs, the solution "
-                f"of {', '.join(self.names)} with {_counts(mine)}; attach the team that was solved"
+                f"team {problem.name!r} is of {', '.join(problem.names)} with {_counts(sizes)} legs, the "
+                f"solution of {', '.join(self.names)} with {_counts(mine)}; attach the team that was solved"
             )
         plan = Timetable(problem, self.joints)
         members = tuple(one.attach(mission) for one, mission in zip(self.members, plan.cut, strict=True))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -10,22 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmoc.basics.arguments import both_ends
-from dmoc.legs.legs import Joint, Leg
+from dmoc.legs.legs import Joint
+from dmoc.phases.order import SAME, Order, as_mission, called
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.team import Team
 
-# Durations that differ by less than this part of the longest are one [-].
-SAME = 1e-9
 # A phase whose duration follows from others must last at least this part of the whole [-].
 SOME = 1e-9
-
-
-class Place(NamedTuple):
-    """A joint between two legs of a body: the body, and which of its joints it is, the start being 0."""
-
-    body: int
-    joint: int
 
 
 class Span(NamedTuple):
@@ -35,10 +26,6 @@ class Span(NamedTuple):
     last: int
     shortest: float
     longest: float
-
-
-# The joints of all bodies in time: those in one group are at one time.
-Order = tuple[tuple[Place, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -215,7 +202,10 @@ class Timetable:
     def words(self) -> str:
         """The joints in their order, for people."""
         told = [
-            " and ".join(f"{self.names[place.body]} {self.missions[place.body].joints[place.joint].name}" for place in group)
+            " and ".join(
+                f"{self.names[place.body]} {self.missions[place.body].joints[place.joint].name}"
+                for place in group
+            )
             for group in self.order
         ]
         return ", ".join(told)
@@ -266,58 +256,6 @@ class Timetable:
 
     def pair_names(self) -> list[str]:
         return self.team.pair_names()
-
-
-def called(body: str, name: str) -> str:
-    """What a joint of a body, or a group of rows, is called among those of all."""
-    return f"{body}: {name}"
-
-
-def as_mission(one: Any) -> Mission:
-    """A member of a team as a mission: a transfer is one of a single leg."""
-    if hasattr(one, "joints"):
-        return one
-    return Mission(
-        mass=one.mass,
-        start=one.start,
-        goal=one.goal,
-        legs=(Leg(one.duration),),
-        effects=one.effects,
-        actuator=one.actuator,
-        objective=one.objective,
-        constraints=one.constraints,
-        start_time=one.start_time,
-        guess=one.guess,
-        inertia=one.inertia,
-        name=one.name,
-    )
-
-
-def order_by(times: Sequence[np.ndarray], missions: Sequence[Mission], longest: float) -> Order:
-    """The order of the joints inside missions that are at these times [s].
-
-    Those that are at one time whatever is found are one group.
-    """
-    known = [_known_joints(mission) for mission in missions]
-    places = [(float(t), Place(body, i + 1)) for body, mine in enumerate(times) for i, t in enumerate(mine)]
-    groups: list[list[Place]] = []
-    before = -np.inf
-    for time, place in sorted(places):
-        group = groups[-1] if groups else []
-        together = time - before <= SAME * longest and known[place.body][place.joint]
-        if not (together and all(known[other.body][other.joint] and other.body != place.body for other in group)):
-            groups.append([])
-        groups[-1].append(place)
-        before = time
-    return tuple(map(tuple, groups))
-
-
-def _known_joints(mission: Mission) -> np.ndarray:
-    """Which joints of a mission are at a time since its start that is stated."""
-    fixed = np.array([leg.duration_bounds[0] == leg.duration_bounds[1] for leg in mission.stretches])
-    whole = mission.duration_bounds[0] == mission.duration_bounds[1]
-    ahead = np.logical_and.accumulate(np.append(True, fixed))
-    return ahead | (whole & np.logical_and.accumulate(np.append(True, fixed[::-1]))[::-1])
 
 
 def _row(span: Span, count: int) -> np.ndarray:

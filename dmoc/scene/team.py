@@ -86,7 +86,7 @@ class Team(Named):
 
     @property
     def phased(self) -> bool:
-        """Whether some member is a mission of several legs, so that the clock has other joints than its ends."""
+        """Whether some member is a mission of several legs, so that the clock has joints inside."""
         return any(hasattr(one, "joints") for one in self.members)
 
     @property
@@ -203,7 +203,9 @@ class Team(Named):
         for part, a, b in self.pairs():
             both, kept = f"{self.names[a]} and {self.names[b]}", part.distance_kept
             if part.meets and any(_turns_at_goal(self.members[i]) for i in (a, b)):
-                raise ValueError(f"{both} are to meet, but the velocity of one is turned at its goal; add a leg")
+                raise ValueError(
+                    f"{both} are to meet, but the velocity of one is turned at its goal; add a leg"
+                )
             start, goal = (self._gap(a, b, end, 0) for end in ("start", "goal"))
             for verb, place in (("start", start), ("end", goal)):
                 if (gap := float(np.linalg.norm(place))) < kept * (1 - 1e-9):

@@ -89,7 +89,9 @@ def in_distances(team: Any, rows: Sequence[tuple[str, float, str]]) -> tuple[tup
     }
     found = []
     for name, size, unit in rows:
-        begins = ((begin, limit) for begin, limit in kept.items() if name.startswith((f"{begin}[", f"{begin} in ")))
+        begins = (
+            (begin, limit) for begin, limit in kept.items() if name.startswith((f"{begin}[", f"{begin} in "))
+        )
         limit = next((limit for _, limit in begins), None)
         found.append((name, *((size, unit) if limit is None else limit.violation(size, ""))))
     return tuple(found)

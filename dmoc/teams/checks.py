@@ -84,7 +84,12 @@ def rows_between(
     q, v = (ca.SX.sym(of, apart.shape[1]) for of in "qv")
     for rows, places, speeds, where in (
         (part.rows(q) if part.limit(q.numel()) is None else [], apart, np.zeros_like(apart), " at nodes"),
-        ([] if drift is None else part.goal_rows(q, v), apart[-1:], np.atleast_2d(drift), ""),
+        (
+            [] if drift is None else part.goal_rows(q, v),
+            apart[-1:],
+            np.zeros((1, 1)) if drift is None else drift[None],
+            "",
+        ),
     ):
         for row in rows:
             have = ca.Function("row", [q, v], [ca.densify(ca.SX(row.expression))])(places.T, speeds.T).full()

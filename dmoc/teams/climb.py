@@ -93,7 +93,7 @@ class TeamClimb(Climb):
         tried = self.from_guess(bent_apart(team, replace(path, legs=tuple(legs))))
         return tried if tried.solved else attempt
 
-    def round_the_other_way(self, attempt: Attempt, path: TeamPath) -> Attempt:
+    def round_the_other_way(self, attempt: Attempt, path: Any) -> Attempt:
         """An answer on which bodies pass on other sides, where they leap through each other on this one."""
         team, answer = self.mission, attempt
         if self.cut_at_leaps(attempt.path) is None:

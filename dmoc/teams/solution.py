@@ -85,6 +85,11 @@ class TeamSolution(Outcome):
         return self.members
 
     @property
+    def part_names(self) -> tuple[str, ...]:
+        """What the parts are called."""
+        return self.names
+
+    @property
     def order(self) -> int:
         return self.members[0].order
 

@@ -1,0 +1,29 @@
+"""Let a robot set down its load at a place on its way while another one crosses, kept apart, least effort."""
+
+from dmoc import Apart, Drop, Leg, Mission, State, Team, TransferProblem, Via
+
+
+def problem(distance: float = 1.0, duration: float = 30.0, load: float = 9.6, place: float = 1.0):
+    """The two robots, in the plane.
+
+    Parameters
+    ----------
+    distance : float [m]
+        The least distance of their centres.
+    duration : float [s]
+        Time for all of it.
+    load : float [kg]
+        Mass that the first robot leaves behind; without it, it has 9.6 kg as the other one has.
+    place : float [m]
+        How far behind the middle the load is set down.
+    """
+    courier = Mission(
+        mass=9.6 + load,
+        start=State((-2, 0), (0, 0)),
+        goal=State((2, 0), (0, 0)),
+        legs=[Leg(name="loaded"), Via((place, 0.5)), Drop(load), Leg(name="empty")],
+        duration=duration,
+        name="courier",
+    )
+    crosser = TransferProblem(9.6, State((0.3, -2), (0, 0)), State((0, 2), (0, 0)), duration, name="crosser")
+    return Team([courier, crosser], [Apart(distance)])
