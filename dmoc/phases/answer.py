@@ -17,9 +17,6 @@ from dmoc.rungs.rung import cut_short
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.teams.answer import in_distances, run_through
 
-# A phase is at its shortest if it lasts no more than so many times that [-].
-SHORT = 2.0
-
 
 def answered(
     climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
@@ -101,7 +98,7 @@ def _warnings(plan: Timetable, path: PhasedPath) -> tuple[str, ...]:
                 other = "shorter" if bound == "shortest" else "longer"
                 ends = f"{word} of {name} ends on its {bound} duration of {lasting(lasts, 6)}"
                 found.append(f"{ends}: a {other} one may cost less")
-    if short := [i for i in plan.between if path.durations[i] <= SHORT * plan.bounds[i, 0]]:
+    if short := plan.short(path.durations):
         found.append(
             f"joints of two bodies end at one time in phase {short[0] + 1}: another order of them may cost less"
         )

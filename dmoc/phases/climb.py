@@ -1,4 +1,4 @@
-"""Solve a team of missions, coarse to fine, on one mesh a phase for all its bodies; from several guesses, too."""
+"""Solve a team of missions, coarse to fine, on one mesh a phase for all bodies; from several guesses, too."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.missions.climb import Attempt, Climb
 from dmoc.missions.guess import first_path
 from dmoc.motion.mesh import uniform_mesh
-from dmoc.phases.answer import SHORT, answered
+from dmoc.phases.answer import answered
 from dmoc.phases.cuts import phased_leaps
 from dmoc.phases.guess import SHORTEST, first_guess, flown_ways, on_clock
 from dmoc.phases.order import Order, as_mission
@@ -18,6 +18,7 @@ from dmoc.phases.path import PhasedPath
 from dmoc.phases.program import PhasedProgram
 from dmoc.phases.solution import PhasedSolution
 from dmoc.phases.timetable import Timetable
+from dmoc.scene.mission import LEAST_SHARE
 from dmoc.scene.team import Team
 from dmoc.solver.solve import check_numerics
 from dmoc.solver.starts import Optimum
@@ -67,37 +68,29 @@ class PhasedClimb(TeamClimb):
         """An answer in which no phase between joints of two bodies is as short as it may be, if it is found.
 
         There the joints would rather follow each other the other way round or, if they do not want that either,
-        be at one time.
+        still nearer to each other, or be at one time.
         """
         for _ in range(MOST_ORDERS * self.mission.count):
             path: Any = attempt.path
             plan: Timetable = self.mission
-            short = self._short(path)
-            if not short or self.interrupt.seen:
+            short = plan.short(path.durations)
+            if not short or not attempt.solved or self.interrupt.seen:
                 break
-            for order, lasts in _other_orders(plan, path, short[0]):
-                self.mission, self.held = plan, attempt
-                tried = self._in_order(order, path, lasts)
+            for order, least, lasts in _other_orders(plan, path, short[0]):
+                tried = self._in_order(Timetable(plan.team, order, least), path, lasts)
                 if tried is not None and self._is_better(tried, attempt):
                     found: Any = tried.path
-                    # The other way round they may end at one time as well.
-                    if found.count == plan.count and short[0] in self._short(found):
-                        continue
-                    attempt = tried
-                    break
-            else:
+                    # Also so they may end as near to each other as may be.
+                    if found.count < plan.count or short[0] not in self.mission.short(found.durations):
+                        attempt = tried
+                        break
                 self.mission, self.held = plan, attempt
+            else:
                 break
         return attempt
 
-    def _short(self, path: Any) -> list[int]:
-        """The phases between joints of two bodies that are as short as they may be."""
-        plan: Timetable = self.mission
-        return [i for i in plan.between if path.durations[i] <= SHORT * plan.bounds[i, 0]]
-
-    def _in_order(self, order: Order, path: PhasedPath, lasts: np.ndarray) -> Attempt | None:
-        """The answer with joints in another order, from a path; None if there is none."""
-        other = Timetable(self.mission.team, order)
+    def _in_order(self, other: Timetable, path: PhasedPath, lasts: np.ndarray) -> Attempt | None:
+        """The answer on another timetable, from a path; None if there is none."""
         if not other.possible:
             return None
         lasts = np.clip(lasts, *other.bounds.T)
@@ -114,14 +107,20 @@ class PhasedClimb(TeamClimb):
         return sense * tried.level.objective <= before + 1e-6 * abs(before)
 
 
-def _other_orders(plan: Timetable, path: PhasedPath, short: int) -> list[tuple[Order, np.ndarray]]:
-    """The two joints around a short phase the other way round, and at one time, with durations of phases."""
+def _other_orders(plan: Timetable, path: PhasedPath, short: int) -> list[tuple[Order, float, np.ndarray]]:
+    """Other timetables: order, shortest phase [-] and likely durations [s].
+
+    The two joints around a short phase are the other way round, nearer to each other, or at one time.
+    """
     groups, lasts = list(plan.order), path.durations
     swapped = [*groups[: short - 1], groups[short], groups[short - 1], *groups[short + 1 :]]
     longer = lasts.copy()
     longer[short] = max(lasts[short], SHORTEST * lasts.sum())
     one = [*groups[: short - 1], groups[short - 1] + groups[short], *groups[short + 1 :]]
-    return [(tuple(swapped), longer), (tuple(one), np.delete(lasts, short))]
+    found = [(tuple(swapped), plan.shortest, longer)]
+    if plan.shortest > LEAST_SHARE:
+        found += [(plan.order, LEAST_SHARE, lasts), (tuple(swapped), LEAST_SHARE, lasts)]
+    return [*found, (tuple(one), plan.shortest, np.delete(lasts, short))]
 
 
 def solve_phased(

@@ -24,6 +24,8 @@ from dmoc.teams.guess import aimed, bent_apart
 SAMPLES = 80
 # No phase of a guess lasts less than this part of the whole [-], as far as its bounds allow.
 SHORTEST = 0.02
+# No phase between joints of two bodies lasts less than this part of the whole [-] until it is known that it must.
+COARSE = 0.01
 # A phase has this many steps at each order, if no number is asked for.
 STEPS = {2: 60, 4: 16, 6: 10, 8: 8}
 
@@ -40,7 +42,9 @@ def first_guess(
     begin, total = own[0].begins[0], float(np.mean([path.duration for path in own]))
     joints = [_stretched(path, total) for path in own]
     longest = team.duration_bounds[1]
-    plan = Timetable(team, order_by([times[1:-1] for times in joints], missions, longest))
+    sequence = order_by([times[1:-1] for times in joints], missions, longest)
+    plan = Timetable(team, sequence, COARSE)
+    plan = plan if plan.possible else Timetable(team, sequence)
     if not plan.possible:
         raise ValueError(
             f"no time was found for the joints of {' and '.join(team.names)} that suits the durations of all "

@@ -140,9 +140,11 @@ class PhasedProgram(MissionProgram):
                 side[at] = mine
             for leg in self.legs[i * self.mission.count : (i + 1) * self.mission.count] if i else ():  # type: ignore[attr-defined]
                 if "duration" in leg.program.columns:
-                    # The durations of the first body have the bounds of all: others would depend on these.
+                    # The durations of the first body have the bounds of all; a second time they would depend on
+                    # each other, so that here they are so wide that none is ever met.
                     place = leg.at("duration", 0)
-                    found[0][place], found[1][place] = -np.inf, np.inf
+                    found[0][place] *= 0.5
+                    found[1][place] *= 2.0
         between = self.first_row + self.joint_rows
         found[2][between:], found[3][between:] = self.row_bounds
         return found[0], found[1], found[2], found[3]

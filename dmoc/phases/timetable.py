@@ -41,10 +41,15 @@ class Timetable:
     team : Team
     order : tuple of tuples of Place
         In which order the joints follow each other.
+    shortest : float
+        The part of the whole that a phase between joints of two bodies lasts at least [-]. Where steps are far
+        shorter there than elsewhere, iterations hardly converge; and whether joints would rather be in another
+        order shows at any such bound.
     """
 
     team: Team
     order: Order
+    shortest: float = LEAST_SHARE
 
     @cached_property
     def missions(self) -> tuple[Mission, ...]:
@@ -110,15 +115,19 @@ class Timetable:
     @property
     def possible(self) -> bool:
         """Whether joints can follow each other in this order."""
-        least = SOME * max(span.longest for span in self.spans)
-        bounds = self.bounds
-        return bool((np.nan_to_num(self.known, nan=1.0) > least).all() and (bounds[:, 0] <= bounds[:, 1]).all())
+        least, bounds = SOME * max(span.longest for span in self.spans), self.bounds
+        fits = [bounds[span.first : span.last + 1, 0].sum() <= span.longest * (1 + SAME) for span in self.spans]
+        reach = [
+            bounds[span.first : span.last + 1, 1].sum() >= span.shortest * (1 - SAME) for span in self.spans
+        ]
+        lasting = (np.nan_to_num(self.known, nan=1.0) > least).all() and (bounds[:, 0] <= bounds[:, 1]).all()
+        return bool(lasting and all(fits) and all(reach))
 
     @cached_property
     def bounds(self) -> np.ndarray:
         """The shortest and the longest duration of each phase [s], shape (phases, 2)."""
         longest = self.team.duration_bounds[1]
-        found = np.array([[LEAST_SHARE * longest, longest]] * self.count)
+        found = np.array([[self.shortest * longest, longest]] * self.count)
         for i, side in enumerate(found):
             covering = [span for span in self.spans if span.first <= i <= span.last]
             alone = [span.shortest for span in covering if span.first == span.last]
@@ -150,6 +159,11 @@ class Timetable:
         """The phases between joints of different bodies whose shortest duration nobody asked for."""
         alone = {span.first for span in self.spans if span.first == span.last}
         return [i for i in range(1, self.count - 1) if i not in alone and np.isnan(self.known[i])]
+
+    def short(self, durations: np.ndarray) -> list[int]:
+        """The phases between joints of two bodies that are as short as they may be, in one list of durations."""
+        spare = LEAST_SHARE * durations.sum()
+        return [i for i in self.between if durations[i] <= self.bounds[i, 0] + spare]
 
     @cached_property
     def cut(self) -> tuple[Mission, ...]:

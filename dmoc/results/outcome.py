@@ -97,7 +97,7 @@ class Outcome:
         with the moment of each body by its name.
         """
         if hasattr(self, "members"):
-            return {name: moment(one, t) for name, one in zip(self.names, self.members, strict=True)}  # type: ignore[attr-defined]
+            return {name: one.at(t) for name, one in zip(self.names, self.members, strict=True)}  # type: ignore[attr-defined]
         return moment_of_legs(self, t)
 
     def table(self) -> Any:

@@ -262,7 +262,7 @@ def _member(index: int, given: Any) -> Any:
         raise ValueError(f"members[{index}] must be a dmoc.TransferProblem or Mission; got {short(given)}")
     if one.objective.learns:
         raise ValueError(f"members[{index}] has Information as its objective, which is one of a transfer alone")
-    if getattr(one, "system", None) is not None or getattr(one, "links", ()):
+    if getattr(one, "system", None) is not None or getattr(one, "links", None):
         raise ValueError(
             f"members[{index}] has links or several bodies of its own, and a body of a team has none; "
             "bodies that links join are one dmoc.System"

@@ -82,15 +82,11 @@ def rows_between(
     sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
     apart = second.path.place - first.path.place
     q, v = (ca.SX.sym(of, apart.shape[1]) for of in "qv")
-    for rows, places, speeds, where in (
-        (part.rows(q) if part.limit(q.numel()) is None else [], apart, np.zeros_like(apart), " at nodes"),
-        (
-            [] if drift is None else part.goal_rows(q, v),
-            apart[-1:],
-            np.zeros((1, 1)) if drift is None else drift[None],
-            "",
-        ),
-    ):
+    at_nodes = part.rows(q) if part.limit(q.numel()) is None else []
+    asked = [(at_nodes, apart, np.zeros_like(apart), " at nodes")]
+    if drift is not None:
+        asked.append((part.goal_rows(q, v), apart[-1:], drift[None], ""))
+    for rows, places, speeds, where in asked:
         for row in rows:
             have = ca.Function("row", [q, v], [ca.densify(ca.SX(row.expression))])(places.T, speeds.T).full()
             beyond = float(np.max(np.maximum(row.lower - have, have - row.upper), initial=0.0))
