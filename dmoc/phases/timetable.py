@@ -161,7 +161,7 @@ class Timetable:
         return [i for i in range(1, self.count - 1) if i not in alone and np.isnan(self.known[i])]
 
     def short(self, durations: np.ndarray) -> list[int]:
-        """The phases between joints of two bodies that are as short as they may be, in one list of durations."""
+        """The phases between joints of two bodies that are as short as they may be, by their durations [s]."""
         spare = LEAST_SHARE * durations.sum()
         return [i for i in self.between if durations[i] <= self.bounds[i, 0] + spare]
 

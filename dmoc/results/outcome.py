@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from dmoc.basics.digits import lasting
-from dmoc.results.moments import moment, moment_of_legs
+from dmoc.results.moments import moment_of_legs
 
 if TYPE_CHECKING:
     from dmoc.results.facts import Level, Provenance
