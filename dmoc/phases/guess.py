@@ -24,7 +24,7 @@ from dmoc.teams.guess import aimed, bent_apart
 SAMPLES = 80
 # No phase of a guess lasts less than this part of the whole [-], as far as its bounds allow.
 SHORTEST = 0.02
-# Until it is known that they must be nearer, joints of two bodies are at least this part of the whole apart [-].
+# Until it is known that they must be nearer, joints of two bodies are this part of the whole apart [-].
 COARSE = 0.01
 # A phase has this many steps at each order, if no number is asked for.
 STEPS = {2: 60, 4: 16, 6: 10, 8: 8}

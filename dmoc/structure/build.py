@@ -77,7 +77,8 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
     if arc.kind == BURN:
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
-    degree = SINGULAR_DEGREE if arc.kind == SINGULAR else None
+    # Where a speed is kept to, that says what the control is.
+    degree = SINGULAR_DEGREE if arc.kind == SINGULAR and not is_of_speed(problem, arc.follows) else None
     sides = sides_of(problem, arc.kind)
     kept = problem.actuator.kept(sides) if any(sides) else None
     linear = names_of(problem) and not is_of_speed(problem, arc.follows)
