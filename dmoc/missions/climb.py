@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ from dmoc.chains.path import MissionPath, cold
 from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
-from dmoc.ipopt.run import Answer, Interrupt, Watch
+from dmoc.ipopt.run import Interrupt, Watch
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
+from dmoc.missions.attempt import Attempt
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
@@ -23,7 +24,7 @@ from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import left_after, local_errors
 from dmoc.results.facts import Error, Level
-from dmoc.rungs.rung import rounded
+from dmoc.rungs.rung import rounded, settled
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
@@ -49,23 +50,6 @@ IDLE, NARROW = 10.0, 1e-4
 OTHER_DURATIONS = (0.5, 2.0, 0.25, 4.0)
 
 
-@dataclass(frozen=True)
-class Attempt:
-    """One run of Ipopt on one set of meshes."""
-
-    program: MissionProgram
-    answer: Answer
-    level: Level
-
-    @property
-    def solved(self) -> bool:
-        return self.answer.status == "solved"
-
-    @property
-    def path(self) -> MissionPath:
-        return self.program.path(self.answer)
-
-
 class Climb:
     """The attempts at one mission, in their order."""
 
@@ -86,7 +70,13 @@ class Climb:
         # What is in the way, where no attempt succeeded, and what another start led to.
         self.reason = self.told = ""
 
-    def attempt(
+    def attempt(self, path: MissionPath, *args: Any, **how: Any) -> Attempt:
+        """Solve on the meshes of a path, and again where the answer hardly takes the force of its units."""
+        made = self._run(path, *args, **how)
+        near = how.get("near") is not None
+        return made if near else settled(made, lambda found: self._run(found, *args, **how))
+
+    def _run(
         self,
         path: MissionPath,
         rounding: float | None = None,

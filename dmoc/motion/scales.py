@@ -5,15 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from dmoc.basics.quaternions import angle_between
+from dmoc.configurations.acting import point_function
 from dmoc.configurations.coordinates import WHEELS, Coordinates
+from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.path import DiscretePath
 
 # A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
 # by the optimiser, and errors of that size are no errors of a turn.
 LEAST_TURN = 1e-4
+# What holds a body up is estimated in this many places of a path.
+HELD_UP_AT = 20
 
 
 def least_extent(mass: float, inertia: Any) -> float:
@@ -83,3 +88,26 @@ def wheel_momentum(path: DiscretePath) -> float:
     stored = path.position[:, path.coordinates.kinds == WHEELS]
     between = np.abs(np.diff(stored, axis=0)) / (path.duration * np.diff(path.fractions))[:, None]
     return float(between.max(initial=0.0)) or 1.0
+
+
+def held_up(problem: Any, path: DiscretePath) -> tuple[float, float]:
+    """About the largest force [N] and torque [N m] that undo what the effects of a scene do along a path."""
+    if not problem.effects:
+        return 0.0, 0.0
+    some = np.linspace(0, len(path.position) - 1, min(len(path.position), HELD_UP_AT)).astype(int)
+    times = problem.start_time + path.duration * path.fractions[some]
+    position, mass = path.position[some], path.mass[some]
+    velocity = np.gradient(position, times, axis=0)
+    acting = point_function(problem.effects, configuration_of(problem), kinetic=False)
+    pull, _, push = (
+        np.array(ca.densify(part)) for part in acting(times[None], position.T, velocity.T, mass[None])
+    )
+    load = np.nan_to_num(np.abs(pull + push) * mass, posinf=0.0).max(axis=1)
+    places = path.coordinates.places
+    return float(load[places].max(initial=0.0)), float(load[~places].max(initial=0.0))
+
+
+def turning_torque(problem: Any, path: DiscretePath) -> float:
+    """The torque that turns the body as far as a path does, or as fast as it turns at an end [N m]."""
+    scales = path_scales(path)
+    return float(problem.moment * max(scales.turn / path.duration, scales.rate) / path.duration)

@@ -7,14 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
+from dmoc.motion.scales import LEAST_TURN, held_up, least_extent, path_scales, turning_torque
 from dmoc.results.flown_cost import cost_functions
+from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
 # The size of the objective is estimated from this many nodes: more do not change its first digit.
 SAMPLED = 400
 # The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
+# A limit above this many times what moves or holds a body up is no unit of force [-], unless the cost is linear
+# in it: at 1e5 N for 1e-5 N the barrier ended at eight times the least effort, as good as zero.
+FAR_ABOVE = 100.0
+# An answer that takes less than this part of the unit of force, or of torque, is worth a second run [-].
+HARDLY = 1e-2
 
 
 @dataclass(frozen=True)
@@ -66,13 +72,13 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
         turns = both - mean
         change = max(change, float(np.linalg.norm(turns, axis=1).max()))
     typical = problem.mass * change / time
-    limit = problem.actuator.force_limit()
+    limit, torques = _limits(problem, guess, typical, length)
     forces = np.array([unit == "N" for unit in problem.actuator.units(problem.dimension)], bool)
     force = float(np.abs(guess.control[:, forces]).max(initial=0.0)) if guess.multipliers else 0.0
     if limit is not None:
         force = min(max(force, LEAST_SHARE * limit), limit) if force else limit
     force = max(force, LEAST_SHARE * typical) if force else typical
-    torque = _torque(problem, guess, force * length)
+    torque = _torque(problem, guess, force * length, torques)
     sizes = np.where(forces, force, torque)
     # All nozzles at once make no force, or next to none by rounding; one of them does.
     first = sizes * (np.arange(len(sizes)) == 0)
@@ -82,7 +88,33 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     return Units(length, time, force, problem.mass, cost, torque, origin)
 
 
-def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> float:
+def outgrown(problem: TransferProblem, units: Units, path: DiscretePath) -> bool:
+    """Whether an answer hardly takes the force or the torque that its units were made for."""
+    if not problem.limited or has_linear_controls(problem):
+        return False
+    fit = units_of(problem, path)
+    return fit.force < HARDLY * units.force or (problem.turns and fit.torque < HARDLY * units.torque)
+
+
+def _limits(
+    problem: TransferProblem, guess: DiscretePath, typical: float, length: float
+) -> tuple[float | None, float | None]:
+    """The limits of force [N] and torque [N m], or what is far above all that the scene calls for."""
+    limits = problem.actuator.force_limit(), problem.actuator.torque_limit()
+    turning = turning_torque(problem, guess)
+    within = ((limit or 0.0) <= FAR_ABOVE * one for limit, one in zip(limits, (typical, turning), strict=True))
+    if all(within) or has_linear_controls(problem):
+        return limits
+    force, torque = held_up(problem, guess)
+    needs = max(typical, force), max(turning, torque, force * length)
+    force_limit, torque_limit = (
+        limit if limit is None or not need else min(limit, FAR_ABOVE * need)
+        for limit, need in zip(limits, needs, strict=True)
+    )
+    return force_limit, torque_limit
+
+
+def _torque(problem: TransferProblem, guess: DiscretePath, without: float, limit: float | None) -> float:
     """The unit of torque: the largest used where a solution is known, else the limit, else what turns the body.
 
     It is `without` [N m] where nothing turns.
@@ -92,13 +124,11 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float) -> fl
     turns = np.array([unit == "N m" for unit in problem.actuator.units(problem.dimension)], bool)
     used = float(np.abs(guess.control[:, turns]).max(initial=0.0)) if guess.multipliers else 0.0
     scales = path_scales(guess)
-    moment, fastest = problem.moment, max(scales.turn / guess.duration, scales.rate)
-    typical = moment * fastest / guess.duration
+    fastest, typical = max(scales.turn / guess.duration, scales.rate), turning_torque(problem, guess)
     if problem.links or fastest * guess.duration <= LEAST_TURN:
         # What links hold up pulls on levers, also where nothing turns. In the attitude of a body that does not
         # turn are the errors of the optimiser alone, which must not be made large.
         typical = max(typical, without)
-    limit = problem.actuator.torque_limit()
     if limit is not None:
         used = min(max(used, LEAST_SHARE * limit), limit) if used else limit
     return max(used, LEAST_SHARE * typical) if used else typical

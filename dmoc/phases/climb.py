@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.attempt import Attempt
+from dmoc.missions.climb import Climb
 from dmoc.missions.guess import first_path
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.phases.answer import answered

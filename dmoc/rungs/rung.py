@@ -15,6 +15,7 @@ from dmoc.ipopt.run import Answer
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
+from dmoc.nlp.units import outgrown
 from dmoc.results.facts import Level, off_optimum
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
@@ -73,6 +74,11 @@ class Rung:
         return self.nlp.path(self.problem, self.answer)
 
     @property
+    def outgrown(self) -> bool:
+        """Whether the answer takes far less than the units were made for."""
+        return outgrown(self.problem, self.nlp.units, self.path)
+
+    @property
     def cost(self) -> float:
         """The objective with the sign of a minimum, in its own unit."""
         return self.problem.objective.sense * self.level.objective
@@ -104,6 +110,27 @@ class Rung:
             told = f"the duration of {lasting(duration, 6)} was kept as it was: another one may cost less"
             return (*known, told)
         return known
+
+
+def settled(made: Any, again: Callable[[Any], Any]) -> Any:
+    """An attempt; while its answer takes far less than its units were made for, the one again from there.
+
+    Of a transfer or of a chain of them. The last one that solved it, or the one that the user ended.
+    """
+    while made.solved and made.outgrown:
+        other = again(made.path)
+        if not other.solved:
+            return other if other.answer.status == "stopped" else made
+        made = other
+    return made
+
+
+def told(cause: Cause, problem: TransferProblem, holds: Callable[[TransferProblem], bool] | None) -> str:
+    """A cause in words, with remedies that hold; without constraints and propellant they always do."""
+    # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
+    local = problem.attraction.first is not None and problem.attraction.lone is None
+    risky = problem.constraints or problem.actuator.burns
+    return (cause.proven(holds) if risky and holds else cause).words(local)
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:

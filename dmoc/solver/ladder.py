@@ -24,7 +24,7 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
-from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded
+from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded, settled, told
 from dmoc.rungs.tube import around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
 
@@ -235,7 +235,12 @@ class Ladder:
         here = partial(self._attempt, problem=problem, limits=limits)
         return led(here(guess), self.ask, problem, guess, here)
 
-    def _attempt(
+    def _attempt(self, guess: DiscretePath, problem: TransferProblem, *args: Any, **how: Any) -> Rung:
+        """One attempt, and more where its answer hardly takes the force that its units were made for."""
+        rung = self._run(guess, problem, *args, **how)
+        return rung if how.get("lean") else settled(rung, lambda path: self._run(path, problem, *args, **how))
+
+    def _run(
         self,
         guess: DiscretePath,
         problem: TransferProblem,
@@ -279,19 +284,12 @@ class Ladder:
         if rung.stopped and self.interrupt.late:
             return self._out_of_time(rung, errors, **found)
         known = errors or {}
-        reason = "" if rung.cause is None or rung.solved else self._told(rung.cause)
+        reason = "" if rung.cause is None or rung.solved else told(rung.cause, self.problem, self.holds)
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
         message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
         return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
-
-    def _told(self, cause: Cause) -> str:
-        """A cause in words, with remedies that hold; without constraints and propellant they always do."""
-        # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
-        local = self.problem.attraction.first is not None and self.problem.attraction.lone is None
-        risky = self.problem.constraints or self.problem.actuator.burns
-        return (cause.proven(self.holds) if risky and self.holds else cause).words(local)
 
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""

@@ -14,8 +14,9 @@ from dmoc.checks.verification import Report
 from dmoc.guess.starting import angle_around
 from dmoc.meshes.choices import first_path
 from dmoc.missions.answer import answered
+from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
-from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.climb import Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.chains.path import cold
-from dmoc.missions.climb import Attempt, Climb
+from dmoc.missions.attempt import Attempt
+from dmoc.missions.climb import Climb
 from dmoc.missions.meshes import mesh_around
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
