@@ -83,7 +83,7 @@ Structure = Annotated[
     switch(
         "--structure/--no-structure",
         help="Make burns, coasts and touches of zones legs with free ends, for high accuracy; tried by itself "
-        "if --tol is below 1e-5.",
+        "if --tol is below 1e-5, or for an engine in a free time up to 1e-4.",
     ),
 ]
 Impulses = Annotated[

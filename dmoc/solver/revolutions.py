@@ -103,10 +103,10 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
     return freed if freed.solved else best
 
 
-def _held(ladder: Ladder, start: DiscretePath, pinned: bool = False) -> Rung:
+def _held(ladder: Ladder, start: DiscretePath) -> Rung:
     """An answer near a path, by way of answers that are held near it less and less."""
     for lean in HELD:
-        rung = ladder.try_on(start, pinned=pinned, lean=lean)
+        rung = ladder.try_on(start, lean=lean)
         start = rung.path if rung.solved else start
     return rung
 
