@@ -131,7 +131,7 @@ def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: 
     from dmoc.reports.tables import optima_table
 
     if hasattr(problem, "together"):
-        from dmoc.teams.optima import team_optima
+        from dmoc.phases.climb import team_optima
 
         found = team_optima(problem, starts, order, hold, guess)
     elif hasattr(problem, "plan"):

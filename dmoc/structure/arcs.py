@@ -168,6 +168,9 @@ def _merged(
         middle = 0.5 * (begin + end)
         kind = next(kind for kind, last in cuts if middle <= last)
         along = next((one for first, last, one in follows if first <= middle <= last), None)
+        if along in kept and kind in (BURN, COAST):
+            # What keeps the speed at its limit is between nothing and full.
+            kind = SINGULAR
         arcs.append(Arc(kind, end, along, touch))
         begin = end
     return tuple(arcs)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 MISSION = "dmoc mission"
 # A file of a team says that it has this one.
 TEAM = "dmoc team"
+# A file of a team of missions says that it has this one.
+PHASED = "dmoc team of missions"
 # Below this tolerance [-] structure pays by itself: steps cut at switches reach it in seconds, and hardly more.
 TIGHT = 1e-5
 
@@ -172,10 +174,14 @@ def solve(
     if impulses not in (None, "auto"):
         raise ValueError(f"impulses must be 'auto' or not given; got {short(impulses)}")
     if hasattr(stated, "together"):
-        from dmoc.teams.climb import solve_team
-
         if structure or impulses is not None:
             raise ValueError("structure and impulses are of one transfer or mission; a dmoc.Team has neither")
+        if stated.phased:
+            from dmoc.phases.climb import solve_phased
+
+            return solve_phased(stated, order, steps, tol, hold, mesh, guess, *rest)
+        from dmoc.teams.climb import solve_team
+
         return solve_team(stated, order, steps, tol, hold, mesh, guess, *rest)
     if not hasattr(stated, "joints"):
         if impulses is not None:
@@ -236,6 +242,10 @@ def verify(
 ) -> Report:
     if problem is None and getattr(solution, "problem", solution) is None:
         solution = attached_as_named(solution)
+    if hasattr(solution, "joints"):
+        from dmoc.phases.checks import verify_phased
+
+        return verify_phased(solution, problem, more)  # type: ignore[arg-type]
     if hasattr(solution, "members"):
         from dmoc.teams.checks import verify_team
 
@@ -260,6 +270,10 @@ def load(path: str | os.PathLike) -> Any:
         from dmoc.teams.solution import read_team
 
         return read_team(path)
+    if kind == PHASED:
+        from dmoc.phases.solution import read_phased
+
+        return read_phased(path)
     if kind != MISSION:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission

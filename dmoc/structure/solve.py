@@ -145,12 +145,11 @@ def _is_settled(found: MissionSolution, coarse: int) -> bool:
 
 
 def can_be_parted(problem: TransferProblem) -> bool:
-    """Whether arcs can be seen: of one body that does not turn, without a limit on speed where it coasts."""
+    """Whether arcs can be seen: of one body that does not turn, in few revolutions."""
     return not (
         problem.turns
         or problem.links
         or any(part.turns_body or part.point for part in problem.constraints)
-        or (is_switched(problem) and any(part.limits_speed for part in problem.constraints))
         or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
     )
 
