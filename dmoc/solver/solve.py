@@ -17,7 +17,7 @@ from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
-from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
+from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_magnitude, onto_price, past_zones
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.second_look import cheaper_revolutions
@@ -101,7 +101,7 @@ def _solved(
         if is_open:
             rung = onto_goal(ladder, rung, first, given, order, pinned)
             rung = onto_price(ladder, rung, pinned)
-        return rung
+        return onto_magnitude(ladder, rung)
 
     rung = mended(rung)
     if guess is None and mesh is None:

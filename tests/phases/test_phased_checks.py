@@ -63,6 +63,12 @@ def test_a_clock_that_is_not_one_fails(delivery):
     assert "duration" in found["together"]
     both = with_leg(with_leg(delivery, 1, 0, duration=longer), 0, 0, duration=longer)
     assert "duration of phases 1 to 2" in failing(both)["together"]
+    moved = tuple(
+        replace(leg, provenance=replace(leg.provenance, start_time=leg.provenance.start_time + 1e-2))
+        for leg in delivery.members[1].legs
+    )
+    later = replace(delivery, members=(delivery.members[0], replace(delivery.members[1], legs=moved)))
+    assert "common start" in failing(later)["together"]
     leg = delivery.members[1].legs[1]
     late = replace(leg, provenance=replace(leg.provenance, start_time=leg.provenance.start_time + 1e-3))
     legs = delivery.members[1].legs[0], late

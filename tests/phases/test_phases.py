@@ -243,6 +243,34 @@ def test_unknowns_of_one_body_touch_no_rows_of_another_but_those_between():
     assert len(set(map(id, kernels))) < len(kernels)
 
 
+def test_nothing_is_asked_for_twice_where_phases_meet():
+    """A distance is asked for at the end of a phase, not at the begin of the next.
+
+    The durations of one body have limits, and those of others follow.
+    """
+    team = load_problem("delivery").make()
+    plan, path = first_phases(team, 4, 6, False)
+    program = PhasedProgram.of(plan, plan.stretches, path)
+    lower, upper, low, _ = program.bounds()
+    first, second = (group for group in program.rows.groups if group.kind == "node")
+    asked = [np.isfinite(group.of(low[program.first_row :]).ravel()) for group in (first, second)]
+    assert asked[0][-1] and not asked[1][0] and asked[1][1:-1].all()
+    places = [int(leg.at("duration", 0)[0]) for leg in program.legs]
+    assert lower[places[2:]] == pytest.approx(0.5 * lower[places[:2]])
+    assert (upper[places[2:]] > upper[places[:2]]).all()
+
+
+def test_bodies_that_leap_through_each_other_between_nodes_are_seen_and_kept_apart():
+    """At a right angle, on three steps of order 2 a phase, they need not be near at any node."""
+    one = Mission(mass=1.0, start=at_rest(-1, 0), goal=at_rest(1, 0), legs=[Leg(6.0), Leg(4.0)], name="east")
+    other = TransferProblem(1.0, at_rest(0, -1), at_rest(0, 1), LASTS, name="north")
+    team = Team([one, other], [Apart(0.2)])
+    coarse = solve(team, order=2, steps=3)
+    assert coarse.status == "infeasible" and "apart east and north between nodes in phase 1" in coarse.message
+    assert not verify(coarse)["together"].ok
+    assert verify(solve(team).raise_for_status()).ok
+
+
 def test_an_answer_is_a_guess_and_finer_meshes_keep_it(delivery):
     again = solve(delivery.problem, guess=delivery)
     assert again.ladder[0].iterations <= 4 and again.objective == pytest.approx(delivery.objective, rel=1e-4)
