@@ -28,7 +28,9 @@ def answered(
 ) -> MissionSolution:
     """The answer of an attempt as a MissionSolution; that of the last mesh solved if the time was over."""
     if attempt.answer.status == "stopped" and climb.interrupt.late:
-        attempt = climb.held or attempt
+        # Where arcs were added since, the last mission that was solved had other legs.
+        held = climb.held
+        attempt = held if held and len(held.path.legs) == len(climb.mission.stretches) else attempt
         found = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
     return _answered(climb, attempt, error, met, tol)
