@@ -101,7 +101,8 @@ def judged(scene: Scene, taken: list[float], longest: float) -> tuple[str, str]:
     try:
         problem = scene.problem
         with at_most(longest):
-            solution = solve(problem, **scene.options)
+            # The judge reads the answer of one mesh, not that of a chain of legs.
+            solution = solve(problem, structure=False, **scene.options)
     except KeyboardInterrupt:
         return "red", "stopped where no iterate was known"
     except ValueError as refusal:

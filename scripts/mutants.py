@@ -144,7 +144,11 @@ def break_at(node: ast.AST) -> None:
     elif isinstance(node, ast.Constant):
         value = node.value
         node.value = (
-            not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else value * 1.5
+            not value
+            if isinstance(value, bool)
+            else value + 1
+            if isinstance(value, int)
+            else value * 1.5 or 1.0
         )
 
 

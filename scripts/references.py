@@ -112,6 +112,7 @@ TABLE = (
     Reference("earth_mars_2028", "velocity change", 5989.178293880826, LAMBERT, (8, 30), 2e-8),
     Reference("delta_iii", "mass", 7529.712, "Betts 2010", (6, 12), 1e-7),
     Reference("three_robots", "effort", 1.80540487595, "cubic splines through the touches", (4, 240), 2e-5),
+    Reference("delivery", "effort", 1.5610367276, "cubic splines through place and touch", (4, 120), 2e-5),
     Reference("two_stage_ascent", "mass", 20162.4824046, "shooting, linear tangent law", (8, 16), 1e-8),
     Reference("halo_transfer", "mass", 0.98442, SHOOTING, (8, 32), 2e-4, attribute="final_mass", unit="kg"),
 )

@@ -33,6 +33,7 @@ LAYERS = [
     ["chains"],
     ["missions"],
     ["teams"],
+    ["phases"],
     ["structure"],
     ["planners"],
     ["sensitivity", "identification"],

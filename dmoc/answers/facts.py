@@ -93,7 +93,7 @@ def _each_of(names: Sequence[str], members: Sequence[Any]) -> list[Fact]:
     """The velocity change and the clearance of each of several bodies."""
     found = []
     for name, member in zip(names, members, strict=True):
-        for fact in _of_transfer(member):
+        for fact in _of_mission(member) if hasattr(member, "legs") else _of_transfer(member):
             if fact.name in ("velocity change", "clearance"):
                 words = f"{name} {fact.words}"
                 found.append(replace(fact, name=f"{fact.name} of {name}", words=words))

@@ -53,7 +53,7 @@ def ends_of(solution: Any) -> list[tuple[str, Any, float]]:
     first, last = solution.time[0], solution.time[-1]
     joints = getattr(solution.problem, "joints", None)
     if joints is None:
-        ends = zip(solution.problem.names, solution.problem.stretches, strict=True)
+        ends = zip(solution.problem.names, solution.problem.members, strict=True)
         return [
             (f"{side} of {name}", getattr(one, side), time)
             for name, one in ends

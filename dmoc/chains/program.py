@@ -55,13 +55,15 @@ class MissionProgram:
         problems: Sequence[TransferProblem],
         path: MissionPath,
         rounding: float | None = None,
+        cost: float = 0.0,
     ) -> MissionProgram:
         """The program of a mission whose legs are these problems, on the meshes of a path.
 
-        The size of an impulse is rounded at zero over the part `rounding` of the unit of speed [-].
+        The size of an impulse is rounded at zero over the part `rounding` of the unit of speed [-]. The unit of
+        the objective is `cost`, or what the path costs if that is not given.
         """
         sizes = [units_of(problem, leg) for problem, leg in zip(problems, path.legs, strict=True)]
-        cost = max(joint_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
+        cost = cost or unit_of_cost(mission, path, sizes)
         legs, blocks, at = [], [], np.zeros(3, int)
         for problem, leg, unit in zip(problems, path.legs, sizes, strict=True):
             program, mine, parameters = leg_program(problem, leg, replace(unit, cost=cost))
@@ -118,6 +120,11 @@ class MissionProgram:
         last = self.legs[-1]
         columns = last.columns + last.program.columns.size + sum(layout.size for layout, _ in self.own.values())
         return columns, self.first_row + self.rows.size, len(self.parameters())
+
+    @property
+    def joint_rows(self) -> int:
+        """Number of rows that belong to joints and to the mission as a whole."""
+        return self.rows.size
 
     @property
     def numerics(self) -> tuple[int, int]:
@@ -282,6 +289,11 @@ class MissionProgram:
             excess = np.nan_to_num(np.maximum(low - values, values - high), nan=np.inf)
             found += [(float(excess[i]), int(i), column) for i in np.argsort(-excess)[:count] if excess[i] > 0]
         return sorted(found, reverse=True)[:count]
+
+
+def unit_of_cost(mission: Mission, path: MissionPath, sizes: Sequence[Units]) -> float:
+    """About what a path costs, by the units of its legs and what its joints cost."""
+    return max(joint_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
 
 
 def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:

@@ -22,6 +22,7 @@ from dmoc.diagnosis.wrong_way import WORTH, share_of, told
 from dmoc.motion.march import node_masses, rollout
 from dmoc.motion.reference import MISSED, apart, goal_miss
 from dmoc.motion.stability import growth_along
+from dmoc.results.estimate import rounded_share
 from dmoc.results.facts import optimality_limit
 from dmoc.results.flown_cost import unpriced
 from dmoc.results.solution import Solution
@@ -205,6 +206,11 @@ def _ledger(evidence: Evidence) -> Check:
     if energy is not None and not energy <= accuracy:
         return Check.of("ledger", energy, accuracy, "of the energy", note)
     priced = unpriced(evidence.problem, evidence.dynamics, evidence.path, evidence.solution.objective)
+    # Throttle is paid for, thrust is flown: where |F| is rounded far too widely they differ all along.
+    rounded = rounded_share(evidence.dynamics, evidence.path)
+    if rounded > max(priced, MISSED):
+        note += f", {rounded:.1e} of the impulse is paid for the rounding of |F| alone"
+        return Check.of("ledger", rounded, MISSED, "of the impulse", note)
     if priced:
         note += f", cost to {priced:.1e} of {accuracy:g}"
     if not priced <= accuracy:

@@ -83,7 +83,7 @@ Structure = Annotated[
     switch(
         "--structure/--no-structure",
         help="Make burns, coasts and touches of zones legs with free ends, for high accuracy; tried by itself "
-        "if --tol is below 1e-5.",
+        "if --tol is below 1e-5, or for an engine in a free time up to 1e-4.",
     ),
 ]
 Impulses = Annotated[
@@ -131,7 +131,7 @@ def best_start(problem: Any, starts: int, order: int | None, hold: bool, guess: 
     from dmoc.reports.tables import optima_table
 
     if hasattr(problem, "together"):
-        from dmoc.teams.optima import team_optima
+        from dmoc.phases.climb import team_optima
 
         found = team_optima(problem, starts, order, hold, guess)
     elif hasattr(problem, "plan"):

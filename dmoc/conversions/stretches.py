@@ -50,7 +50,8 @@ def stretches_of(solution: Any) -> list[Stretch]:
     if hasattr(solution, "legs"):
         return [_stretch(leg, leg.provenance.problem_name) for leg in solution.legs]
     if hasattr(solution, "members"):
-        return [_stretch(one, name) for name, one in zip(solution.names, solution.members, strict=True)]
+        pairs = zip(solution.part_names, solution.parts, strict=True)
+        return [_stretch(one, name) for name, one in pairs]
     return [_stretch(solution, solution.provenance.problem_name)]
 
 
@@ -64,7 +65,7 @@ def in_space(solution: Any, form: str) -> list[Stretch]:
     """
     found = stretches_of(solution)
     axes = found[0].position.shape[1]
-    one = getattr(solution, "legs", getattr(solution, "members", (solution,)))[0]
+    one = solution.parts[0]
     if axes != 3 or len(one.path.coordinates.place_labels) != 3:
         what = f"this has {axes} axes" if axes < 3 else "this is of several bodies on links"
         raise ValueError(f"{form} holds places of a body in space, x, y and z; {what}: use csv or json")

@@ -102,8 +102,10 @@ def mission_cause(
     the `Level` of every run; once `interrupt` has seen something, nothing is found any more.
     """
     elastic = Elastic(program, tell, interrupt)
-    between = _of_impulses if hasattr(program.mission, "joints") else _of_pairs
-    limits = [*_of_legs(program, paths[0]), *between(program)]
+    mission = program.mission
+    limits = _of_legs(program, paths[0])
+    limits += _of_impulses(program) if hasattr(mission, "joints") else []
+    limits += _of_pairs(program) if hasattr(mission, "pairs") else []
     if limits:
         relaxed = elastic.relaxed(*limits)
         for path in paths:
@@ -185,8 +187,11 @@ def _of_pairs(program: Any) -> list[Yielding]:
     found, none = [], np.zeros(0)
     for name, (part, a, b) in zip(program.mission.pair_names(), program.mission.pairs(), strict=True):
         if part.distance_kept:
-            group = program.rows[name]
-            places = program.first_row + np.arange(group.start, group.stop)
+            # A team of missions has a group of rows for each phase.
+            groups = [
+                one for one in program.rows.groups if one.name == name or one.name.startswith(f"{name} in ")
+            ]
+            places = program.first_row + np.concatenate([np.arange(one.start, one.stop) for one in groups])
             both = f"between {program.mission.names[a]} and {program.mission.names[b]}"
             words = _of_pair(part, both)
             found.append(Yielding(words, places, np.ones(len(places)), np.zeros(0, int), none, none))

@@ -125,6 +125,11 @@ def export(
     kind: Any = Mission if hasattr(problem, "joints") else TransferProblem
     kind = Team if hasattr(problem, "together") else kind
     of_kind("problem", problem, kind)
+    if getattr(problem, "phased", False):
+        raise ValueError(
+            "a team of missions of several legs is not exported; export the missions of its bodies one by one, "
+            "or a team of transfers"
+        )
     if problem.objective.learns:
         raise ValueError("a plan with Information has no exported functions; export it with another objective")
     hold, c = flag("hold", hold), flag("c", c)

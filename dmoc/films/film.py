@@ -61,13 +61,13 @@ def animate(
     ValueError
         If the suffix is another one, the folder does not exist, ffmpeg is missing or the path is not finite.
     """
-    several = hasattr(solution, "legs") or hasattr(solution, "members")
-    if not several:
+    parts: Any = getattr(solution, "parts", None)
+    if parts is None:
         of_kind("solution", solution, Solution)
+    several = parts != (solution,)
     check_target(path)
     if type(frames) is not int or not 2 <= frames <= MOST_FRAMES:
         raise ValueError(f"frames must be a whole number from 2 to {MOST_FRAMES}; got {short(frames)}")
-    parts: Any = getattr(solution, "legs", None) or getattr(solution, "members", None) or [solution]
     if not all(np.isfinite(part.path.position).all() for part in parts):
         raise ValueError("the path is not finite, so there is nothing to show")
     import matplotlib

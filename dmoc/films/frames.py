@@ -89,8 +89,12 @@ def scene_of(solution: Any, frames: int) -> Scene:
 def _team(solution: Any, times: np.ndarray) -> Scene:
     """The lines of all bodies, each with its name and in its colour."""
     extent = float(np.ptp(solution.position, axis=0).max()) or 1.0
-    largest = max(float(np.linalg.norm(one.force, axis=1).max(initial=0.0)) for one in solution.members)
-    parts = [_scene(one, times, _Scale(extent, largest)) for one in solution.members]
+    largest = max(float(np.linalg.norm(one.force, axis=1).max(initial=0.0)) for one in solution.parts)
+    scale = _Scale(extent, largest)
+    parts = [
+        _mission(one, times, scale) if hasattr(one, "legs") else _scene(one, times, scale)
+        for one in solution.members
+    ]
     trails = [
         Trail(i, known.times, known.points, style["color"])
         for i, (part, style) in enumerate(zip(parts, styles(solution.names), strict=True))
@@ -106,12 +110,12 @@ def _team(solution: Any, times: np.ndarray) -> Scene:
         [push for part in parts for push in part.pushes],
         next((part.push_words for part in parts if part.pushes), ""),
         trails,
-        np.empty((0, parts[0].axes)),
-        [],
+        np.concatenate([part.joints for part in parts]),
+        [kick for part in parts for kick in part.kicks],
     )
 
 
-def _mission(solution: Any, times: np.ndarray) -> Scene:
+def _mission(solution: Any, times: np.ndarray, scale: _Scale | None = None) -> Scene:
     """The lines of all legs, one after the other, with joints and impulses."""
     begins = [leg.provenance.start_time for leg in solution.legs]
     which = np.searchsorted(begins[1:], times, side="right")
@@ -123,7 +127,7 @@ def _mission(solution: Any, times: np.ndarray) -> Scene:
         held = np.interp(np.linspace(0, 1, len(leg.force)), leg.path.fractions, leg.path.mass)
         pushed.append(np.linalg.norm(leg.force, axis=1) / (held if light else 1.0))
     seen = [i for i in range(len(begins)) if (which == i).any()]
-    scale = _Scale(extent, max(float(size.max(initial=0.0)) for size in pushed), light)
+    scale = scale or _Scale(extent, max(float(size.max(initial=0.0)) for size in pushed), light)
     parts = [_scene(solution.legs[i], times[which == i], scale) for i in seen]
     axes, count = parts[0].axes, max(len(part.pushes) for part in parts)
 

@@ -101,14 +101,24 @@ def _least_effort(
     A guess that does not meet the equations of motion so well is many revolutions off at the end, and over
     hundreds of them Ipopt does not find the way back.
     """
+    start = problem.start.fixed()[0][None]
+    if problem.attraction.lone is None or np.isnan(start).any():
+        return None
+    if duration * problem.attraction.rates(start)[0] < 2 * np.pi * VERY_MANY_TURNS:
+        return None
+    return least_effort_to_orbit(problem, mesh, order, hold, duration)
+
+
+def least_effort_to_orbit(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
+) -> DiscretePath | None:
+    """The path of least effort from a known state to an open place on an orbit; None if none is found."""
     attractor, start = problem.attraction.lone, problem.start.fixed()
     # Only where the controls are the force, or the force and its magnitude, are they known from the force.
     more = problem.actuator.labels(problem.dimension)[problem.dimension :]
     # Shots see the conditions of the goal, not numbers that it fixes.
     other = problem.goal.anchored or np.isnan(start).any() or not np.isnan(problem.goal.fixed()).all()
     if attractor is None or problem.constraints or problem.links or other or more not in ((), ("throttle",)):
-        return None
-    if duration * problem.attraction.rates(start[0][None])[0] < 2 * np.pi * VERY_MANY_TURNS:
         return None
     path = least_effort(problem, duration, start)
     if path is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -37,6 +37,7 @@ class Frame(Event):
 
     position: Callable
     name: str = "another frame"
+    changes_frame: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not callable(self.position):
@@ -73,6 +74,7 @@ class Bounce(Event):
 
     surface: Callable
     restitution: float = 1.0
+    turns_velocity: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not callable(self.surface):
@@ -128,6 +130,7 @@ class Flyby(Event):
     position: Callable
     radius: float
     mu: float
+    turns_velocity: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not callable(self.position):

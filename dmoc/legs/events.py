@@ -46,6 +46,10 @@ class Event(Duties):
     pushes: ClassVar[bool] = False
     # Whether the energy per mass is the same before and behind it.
     keeps_energy: ClassVar[bool] = False
+    # Whether it turns the velocity without a push.
+    turns_velocity: ClassVar[bool] = False
+    # Whether positions count in another frame behind it.
+    changes_frame: ClassVar[bool] = False
     # The controls that go on over it without a jump, and whether their limits there are left to the leg behind
     # it, not to the one before.
     continued: tuple[int, ...] = ()

@@ -28,7 +28,9 @@ def answered(
 ) -> MissionSolution:
     """The answer of an attempt as a MissionSolution; that of the last mesh solved if the time was over."""
     if attempt.answer.status == "stopped" and climb.interrupt.late:
-        attempt = climb.held or attempt
+        # Where arcs were added since, the last mission that was solved had other legs.
+        held = climb.held
+        attempt = held if held and len(held.path.legs) == len(climb.mission.stretches) else attempt
         found = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
     return _answered(climb, attempt, error, met, tol)
@@ -53,21 +55,45 @@ def straightened(climb: Any, attempt: Any, most: int) -> Any:
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:
     mission, program, answer = climb.mission, attempt.program, attempt.answer
     path, status = attempt.path, answer.status
-    costs = costs_of(program, answer.x)
-    unit = mission.objective.unit_with(mission.actuator)
-    about = Provenance(mission.name, mission.parameters, path.begins[0], unit, **dates_of(mission))
-    legs = tuple(
-        _leg_solution(mission, i, path, costs[i], status, climb.levels[-1]) for i in range(len(path.legs))
+    made = mission_solution(
+        mission, path, costs_of(program, answer.x), attempt.level.objective, status, climb.levels
     )
-    steps = ", ".join(str(leg.steps) for leg in legs)
+    steps = ", ".join(str(leg.steps) for leg in made.legs)
     if status == "solved":
-        message, success = "a local optimum", True
+        message, success = made.message, True
     else:
         message, success = climb.reason or STATUSES[status].advice, False
     if success and not met:
         status, success = NOT_MET, False
         reached = "unknown" if error is None else f"{error.largest:.1e}"
         message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    return replace(
+        made,
+        success=success,
+        status=status,
+        message=message,
+        ladder=tuple(climb.levels),
+        worst=() if success else worst_rows(program, answer, path),
+        warnings=_warnings(mission, made.legs) if success else (),
+        tolerance=tol,
+        error=error,
+        reason=f"{len(made.legs)} legs of {steps} steps{climb.told}",
+        provenance=replace(made.provenance, options=climb.options),
+    )
+
+
+def mission_solution(
+    mission: Mission,
+    path: MissionPath,
+    costs: np.ndarray,
+    objective: float,
+    status: str,
+    levels: Sequence[Level],
+) -> MissionSolution:
+    """A path as the solution of a mission; `costs` are those of its legs, as they are minimised."""
+    unit = mission.objective.unit_with(mission.actuator)
+    about = Provenance(mission.name, mission.parameters, path.begins[0], unit, **dates_of(mission))
+    legs = tuple(_leg_solution(mission, i, path, costs[i], status, levels[-1]) for i in range(len(path.legs)))
     impulses = _impulses(mission, path, legs)
     mass = float(path.legs[-1].mass[-1])
     sizes = [kick.size for kick in impulses if kick.joint == "goal"]
@@ -79,18 +105,13 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         impulses,
         path.own,
         path.forces,
-        attempt.level.objective,
+        objective,
         mass,
-        success,
+        status == "solved",
         status,
-        message,
-        tuple(climb.levels),
-        worst=() if success else worst_rows(program, answer, path),
-        warnings=_warnings(mission, legs) if success else (),
-        tolerance=tol,
-        error=error,
-        reason=f"{len(legs)} legs of {steps} steps{climb.told}",
-        provenance=replace(about, options=climb.options),
+        "a local optimum",
+        (levels[-1],),
+        provenance=about,
     )
 
 

@@ -87,8 +87,8 @@ class Whole:
     def joints(self) -> Check:
         """States, times and masses beside each joint, and the conditions of start, goal and events."""
         lbx, ubx, low, high = self.program.bounds()
-        first = self.program.first_row
-        excess = np.maximum(low - self.rows, self.rows - high)[first:]
+        first, last = self.program.first_row, self.program.first_row + self.program.joint_rows
+        excess = np.maximum(low - self.rows, self.rows - high)[first:last]
         outside = np.maximum(lbx - self.x, self.x - ubx)
         if not len(excess):
             return Check("joints", None, None, "-", True, "there is none")
@@ -101,8 +101,7 @@ class Whole:
 
     def optimality(self) -> Check:
         """First-order conditions of the mission, and whether the objective is the cost of the path."""
-        legs = getattr(self.solution, "members", None) or self.solution.legs
-        share = share_of(legs, self.solution.objective)
+        share = share_of(self.solution.parts, self.solution.objective)
         if share > WORTH:
             return Check.of("optimality", share, WORTH, "of the objective", told(share))
         program, (lbx, ubx, lbg, ubg) = self.program, self.program.bounds()

@@ -17,18 +17,14 @@ from dmoc.configurations.base import Configuration
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.ends.base import State
 from dmoc.guess.starting import controls_for, starting_guess
-from dmoc.meshes.choices import A_TURN, UNEVEN
 from dmoc.missions.arcs import cheapest_arc
+from dmoc.missions.meshes import ORDER, STEPS, meshes_along
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
-# A leg has this order if none is asked for: inside a leg nothing switches, so that a high order pays.
-ORDER = 6
-# A leg has this many steps at each order, if no number is asked for.
-STEPS = {2: 80, 4: 24, 6: 12, 8: 10}
 # A guess of the whole mission is made at this many places, then cut into legs.
 SAMPLES = 400
 # An engine of a guess burns at full thrust as long as this part of the mass is left [-].
@@ -36,15 +32,19 @@ LEAST_MASS = 0.2
 
 
 def guessed(
-    mission: Mission, meshes: Sequence[tuple[np.ndarray, int]], hold: bool = False, given: Any = None
+    mission: Mission,
+    meshes: Sequence[tuple[np.ndarray, int]],
+    hold: bool = False,
+    given: Any = None,
+    total: float | None = None,
 ) -> MissionPath:
     """A guess on the meshes of all legs, one pair of mesh and order a leg.
 
     From `given`, a path over the whole mission as a function of the time or as arrays, else from the physics:
-    straight lines and coasts between the places that are known.
+    straight lines and coasts between the places that are known, in about the time `total` [s].
     """
     given = _checked_guess(mission, given)
-    total = float(np.ptp(given[0])) if isinstance(given, tuple) else None
+    total = float(np.ptp(given[0])) if isinstance(given, tuple) else total
     durations = likely_durations(mission, total)
     arc = cheapest_arc(mission) if given is None else None
     begin = float(np.mean(mission.start_bounds))
@@ -52,7 +52,18 @@ def guessed(
         begin, durations = arc.begin, likely_durations(mission, arc.duration)
     begins = begin + np.append(0.0, np.cumsum(durations))
     places = _places(mission, durations, begins, given) if arc is None else arc.places
-    legs, mass, own = [], float(mission.mass), {}
+    return along(mission, meshes, hold, places, begins)
+
+
+def along(
+    mission: Mission,
+    meshes: Sequence[tuple[np.ndarray, int]],
+    hold: bool,
+    places: Callable[[np.ndarray], np.ndarray],
+    begins: np.ndarray,
+) -> MissionPath:
+    """A guess at places that are a function of the time; `begins` are when legs begin, then the end [s]."""
+    legs, mass, own, durations = [], float(mission.mass), {}, np.diff(begins)
     for i, (problem, (mesh, order)) in enumerate(zip(mission.stretches, meshes, strict=True)):
         mass = _after(mission, i, mass)
         legs.append(_leg(problem, (mesh, order, hold), places, begins[i], durations[i], mass))
@@ -233,45 +244,6 @@ def _own(mission: Mission, joint: Any, legs: list[DiscretePath]) -> np.ndarray |
     parts = [before] if at_start else []
     parts += [event.first_guess(before[:axes], after[:axes]) for event in joint.events]
     return np.concatenate(parts)
-
-
-def meshes_along(
-    mission: Mission, path: MissionPath, order: int | None, steps: int | None
-) -> list[tuple[np.ndarray, int]]:
-    """A mesh for each leg along a path: equal steps, or equal angles where it passes near an attractor."""
-    found = []
-    for leg, problem, mine in zip(mission.plan, mission.stretches, path.legs, strict=True):
-        this = leg.order or order or ORDER
-        count = leg.steps or steps
-        have = (len(mine.mesh) - 1) * mine.order // this if mine.multipliers else 0
-        least = max(STEPS[this], have)
-        found.append(
-            (mesh_around(problem, mine.place, mine.fractions, mine.duration, this, least, count), this)
-        )
-    return found
-
-
-def mesh_around(
-    problem: TransferProblem,
-    places: np.ndarray,
-    fractions: np.ndarray,
-    duration: float,
-    order: int,
-    least: int,
-    count: int | None = None,
-) -> np.ndarray:
-    """Steps of equal times or, where places come near to an attractor, of equal angles around it.
-
-    There are `count` of them or, if that is not given, `least` and as many as the revolutions need.
-    """
-    rates = problem.attraction.rates(places)
-    angles = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(fractions)))
-    turns = angles[-1] * duration / (2 * np.pi)
-    mesh = uniform_mesh(count or max(least, int(np.ceil(turns * A_TURN[order]))))
-    if rates.max() > UNEVEN * rates.min() > 0:
-        mesh = np.interp(mesh, angles / angles[-1], fractions)
-        mesh[0], mesh[-1] = 0.0, 1.0
-    return mesh
 
 
 def first_path(mission: Mission, order: int | None, steps: int | None, hold: bool, guess: Any) -> MissionPath:

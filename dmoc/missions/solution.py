@@ -100,6 +100,11 @@ class MissionSolution(Outcome):
         return MissionPath(legs, begins, self.own, self.forces, idle=idle)
 
     @property
+    def parts(self) -> tuple[Solution, ...]:
+        """The legs, each like the solution of a transfer."""
+        return self.legs
+
+    @property
     def order(self) -> int:
         """The largest order among the legs."""
         return max(leg.order for leg in self.legs)
@@ -184,7 +189,7 @@ class MissionSolution(Outcome):
     def save(self, path: str | os.PathLike, **provenance: Any) -> None:
         """Write the solution to a netCDF-4 file, whole or not at all; `provenance` as of a `Solution`."""
         whole = replace(self, provenance=replace(self.provenance, **provenance))
-        facts, table = _written(whole)
+        facts, table = mission_parts(whole)
         write_table(path, facts, table)
 
 
@@ -192,11 +197,11 @@ def read_mission(path: str | os.PathLike, make: Callable = Solution) -> MissionS
     """The solution of a mission in a file, without its mission."""
     facts, table = read_table(path, MISSION_FILE)
     with damage_told(path):
-        return _read(facts, table, make)
+        return mission_of(facts, table, make)
 
 
-def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
-    """Attributes and variables: those of each leg with `leg_1_` and so on before their names."""
+def mission_parts(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
+    """Attributes and variables of a solution: those of each leg with `leg_1_` and so on before their names."""
     facts, _ = solution_parts(solution, plain=True)
     facts |= {"format": MISSION_FILE.name, "format_version": MISSION_FILE.version, "legs": len(solution.legs)}
     facts["final_mass"] = solution.final_mass
@@ -216,7 +221,8 @@ def _written(solution: MissionSolution) -> tuple[dict[str, Any], Table]:
     return facts, table
 
 
-def _read(facts: dict[str, Any], table: Table, make: Callable) -> MissionSolution:
+def mission_of(facts: dict[str, Any], table: Table, make: Callable) -> MissionSolution:
+    """The solution that `mission_parts` wrote down."""
     legs = []
     for i in range(int(facts["legs"])):
         prefix = f"leg_{i + 1}_"

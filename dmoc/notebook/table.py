@@ -17,10 +17,10 @@ def node_table(solution: Any) -> Any:
     import pandas
 
     what = "leg" if hasattr(solution, "legs") else "body"
-    parts = getattr(solution, "legs", None) or getattr(solution, "members", None)
-    if parts is None:
+    parts = solution.parts
+    if parts == (solution,):
         return pandas.DataFrame(_columns(solution))
-    names = getattr(solution, "names", None) or [one.provenance.problem_name for one in parts]
+    names = getattr(solution, "part_names", None) or [one.provenance.problem_name for one in parts]
     tables = [pandas.DataFrame({what: name} | _columns(one)) for name, one in zip(names, parts, strict=True)]
     return pandas.concat(tables, ignore_index=True)
 

@@ -13,7 +13,7 @@ from dmoc.plots.lanes import CHANGED, LEG_COLOURS, lanes_of, looks_of
 from dmoc.plots.page import draw_speed, panels_of
 from dmoc.plots.sheet import shade_burns
 from dmoc.plots.style import LIMIT, PALE, PATH, readable
-from dmoc.plots.team import LANES, styles
+from dmoc.plots.team import LANES, drawn
 from dmoc.results.moments import moving
 
 # Curves between the nodes have about so many points in all.
@@ -44,7 +44,7 @@ def panels_over_time(solution: Any, late: float) -> list[dict[str, Any]]:
 
 def parts_of(solution: Any) -> list[Any]:
     """The legs of a mission, the bodies of a team, or the transfer itself."""
-    return list(getattr(solution, "legs", None) or getattr(solution, "members", None) or [solution])
+    return list(solution.parts)
 
 
 def _distances(parts: list[Any]) -> list[Any]:
@@ -106,8 +106,7 @@ def _draw_clearance(parts: list[Any], axes: Any, solution: Any, late: float) -> 
 def _looks(solution: Any) -> dict[int, dict[str, Any]]:
     """The look of the curve of each part of a solution, by its identity."""
     if hasattr(solution, "members"):
-        bodies = zip(solution.members, solution.names, styles(solution.names), strict=True)
-        return {id(one): {**style, "label": name} for one, name, style in bodies}
+        return {id(part): {**style, "label": label} for label, part, style in drawn(solution)}
     if hasattr(solution, "legs"):
         looks = zip(solution.legs, looks_of(solution.legs), strict=True)
         return {id(leg): {**look.style, "label": look.label} for leg, look in looks}

@@ -66,10 +66,10 @@ def report(
         the solution is not finite.
     """
     check_page(path)
-    parts = getattr(solution, "legs", None) or getattr(solution, "members", None)
+    parts: Any = getattr(solution, "parts", None)
     if parts is None:
         of_kind("solution", solution, Solution)
-    if not all(np.isfinite(part.path.position).all() for part in parts or [solution]):
+    if not all(np.isfinite(part.path.position).all() for part in parts):
         raise ValueError("the path is not finite, so there is nothing to show; see the checks and messages")
     trials = None if study is None else read_study(study)
     solution = _with_problem(solution)

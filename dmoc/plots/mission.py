@@ -83,7 +83,7 @@ def scenery(solution: MissionSolution) -> Any:
     """What lies around the path: the effects and constraints of all legs, each once, as of one transfer."""
     around: Any = None
     if solution.problem is not None:
-        stretches = solution.problem.stretches
+        stretches: Any = [part.problem for part in solution.parts]
         effects = _once(effect for leg in stretches for effect in leg.effects)
         around = SimpleNamespace(
             effects=effects,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,8 +45,10 @@ def team_page(solution: TeamSolution, report: Report | None = None) -> Figure:
     size, unit = readable(solution.time, "s")
     for panel, draw in zip(panels, LANES, strict=True):
         draw(panel, solution, size)
-        for one in solution.members:
+        for one in solution.parts:
             shade_burns(panel, one, size)
+        for time in joint_times(solution):
+            panel.axvline(time / size, color=PALE, linewidth=0.9, linestyle=(0, (2, 2)), zorder=0.8)
     arrange(page, panels, wide, unit)
     entitle(page, solution, report, size, unit)
     return page
@@ -61,6 +63,18 @@ def styles(names: Sequence[str]) -> list[dict[str, Any]]:
     return found
 
 
+def drawn(solution: TeamSolution) -> Iterator[tuple[str, Any, dict[str, Any]]]:
+    """Each part of each body with its label and its look; the legs of a body have one label."""
+    for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
+        for i, part in enumerate(one.parts):
+            yield "_leg" if i else name, part, style
+
+
+def joint_times(solution: TeamSolution) -> list[float]:
+    """When a leg of some body begins that is not its first [s]."""
+    return [leg.provenance.start_time for leg in solution.members[0].parts[1:]]
+
+
 def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], beside: bool) -> None:
     """The paths, each in its colour, with forces and marks where all bodies are at equal times."""
     around, view = scenery
@@ -69,11 +83,15 @@ def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], bes
     proxies = draw_scene(axes, around, view, size)
     extent = extent_of(solution.position)
     moments = np.linspace(0.0, 1.0, MOMENTS + 2)
-    for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
+    for one, style in zip(solution.members, styles(solution.names), strict=True):
+        _mark(axes, _at(one, moments) / size, style["color"])
+        if len(joints := _joints(one)):
+            look = {"linestyle": "none", "marker": "D", "markersize": 7, "color": style["color"], "zorder": 6.5}
+            axes.plot(*joints.T / size, label="_joints", **look)
+    for name, one, style in drawn(solution):
         curve = within_steps(one, one.position)[1] / size
         mark_burns(axes, one, one.position.T / size)
         axes.plot(*curve.T, label=name, zorder=4.5, **style)
-        _mark(axes, _at(one, moments) / size, style["color"])
         tails, arrows, _ = scaled_arrows(*pushes(one), extent)
         _arrows(axes, tails / size, arrows / size, style["color"])
         if solution.dimension == 3:
@@ -88,9 +106,17 @@ def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], bes
 
 def _at(one: Any, fractions: np.ndarray) -> np.ndarray:
     """Places of a body at fractions of the duration [m], near enough for a mark."""
-    times, curve = within_steps(one, one.position)
+    parts = [within_steps(part, part.position) for part in one.parts]
+    times, curve = (np.concatenate(side) for side in zip(*parts, strict=True))
     at = one.time[0] + fractions * one.duration
     return np.stack([np.interp(at, times, column) for column in curve.T], axis=1)
+
+
+def _joints(one: Any) -> np.ndarray:
+    """Places where something happens to a body on its way, shape (joints, axes) [m]."""
+    joints = getattr(one.problem, "joints", ())
+    places = [one.parts[joint.right].position[0] for joint in joints[1:-1] if joint.events]
+    return np.array(places).reshape(-1, one.position.shape[1])
 
 
 def _mark(axes: Any, places: np.ndarray, colour: str) -> None:
@@ -116,7 +142,7 @@ def _arrows(axes: Any, tails: np.ndarray, arrows: np.ndarray, colour: str) -> No
 def draw_lines(axes: Any, solution: TeamSolution) -> None:
     """Positions against time in one dimension."""
     (late, late_unit), (size, unit) = readable(solution.time, "s"), readable(solution.position, "m")
-    for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
+    for name, one, style in drawn(solution):
         times, path = within_steps(one, one.position)
         axes.plot(times / late, path[:, 0] / size, label=name, **style)
     axes.set(xlabel=f"time [{late_unit}]", ylabel=f"x [{unit}]")
@@ -126,8 +152,8 @@ def draw_lines(axes: Any, solution: TeamSolution) -> None:
 
 def _draw_forces(axes: Any, solution: TeamSolution, late: float) -> None:
     """The magnitude of the force on each body, and its limit where it comes near it."""
-    size, unit = readable(np.concatenate([one.force for one in solution.members]), "N")
-    for name, one, style in zip(solution.names, solution.members, styles(solution.names), strict=True):
+    size, unit = readable(np.concatenate([one.force.ravel() for one in solution.parts]), "N")
+    for name, one, style in drawn(solution):
         times, force = flown_force(one)
         if one.hold:
             times, force = np.repeat(one.end_times, 2)[1:-1], np.repeat(one.force, 2, axis=0)
@@ -142,9 +168,9 @@ def _draw_forces(axes: Any, solution: TeamSolution, late: float) -> None:
 
 
 def _draw_speeds(axes: Any, solution: TeamSolution, late: float) -> None:
-    curves = [speeds(one) for one in solution.members]
-    size, unit = readable(np.concatenate([speed for _, speed in curves]), "m/s")
-    for (times, speed), style in zip(curves, styles(solution.names), strict=True):
+    curves = [(*speeds(one), style) for _, one, style in drawn(solution)]
+    size, unit = readable(np.concatenate([speed for _, speed, _ in curves]), "m/s")
+    for times, speed, style in curves:
         axes.plot(times / late, speed / size, label="_body", **style)
     name = "velocities" if solution.dimension == 1 else "speeds"
     axes.set_ylabel(f"{name} [{unit}]")
@@ -157,8 +183,9 @@ def _draw_distances(axes: Any, solution: TeamSolution, late: float) -> None:
     every = [(i, k) for i in range(len(names)) for k in range(i + 1, len(names))]
     curves = []
     for i, k in every:
-        gap = solution.members[k].position - solution.members[i].position
-        times, within = within_steps(solution.members[i], gap)
+        pairs = zip(solution.members[i].parts, solution.members[k].parts, strict=True)
+        parts = [within_steps(one, other.position - one.position) for one, other in pairs]
+        times, within = (np.concatenate(side) for side in zip(*parts, strict=True))
         curves.append((times, np.linalg.norm(within, axis=1)))
     kept = {}
     if solution.problem is not None:

@@ -103,7 +103,12 @@ def _of_team(solution: Any) -> dict[str, Any]:
         # All bodies share them.
         "nodes": len(solution.time),
         "bodies": [
-            {"name": name, "cost": float(one.objective), "final_mass": float(one.final_mass)}
+            {
+                "name": name,
+                "cost": float(one.objective),
+                "final_mass": float(one.final_mass),
+                **(_of_mission(one) if hasattr(one, "legs") else {}),
+            }
             for name, one in zip(names, solution.members, strict=True)
         ],
         "distances": [

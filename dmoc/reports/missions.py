@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
@@ -12,7 +13,7 @@ from dmoc.reports.ends import dates_rows
 from dmoc.reports.layout import effect_words, pairs, plain_table
 
 if TYPE_CHECKING:
-    from dmoc.missions.solution import MissionSolution
+    from dmoc.missions.solution import Kick, MissionSolution
     from dmoc.scene.mission import Mission
 
 
@@ -74,12 +75,15 @@ def legs_table(solution: MissionSolution) -> RenderableType:
     if solution.arcs:
         parts.append(Text(f"found from a coarse answer: {solution.reason}"))
     if solution.impulses:
-        kicks = plain_table(
-            ["impulse at", "time", "velocity change [m/s]", "along each axis [m/s]"], slice(1, 3)
-        )
-        for kick in solution.impulses:
-            along = ", ".join(f"{value:.5g}" for value in kick.change)
-            when = lasting(kick.time, 6) if kick.time else "0 s"
-            kicks.add_row(kick.joint, when, f"{kick.size:.8g}", f"({along})")
-        parts += [Text(), Text("Impulses", "bold"), kicks]
+        parts += [Text(), *impulses_table([(kick.joint, kick) for kick in solution.impulses])]
     return Group(*parts)
+
+
+def impulses_table(kicks: Sequence[tuple[str, Kick]]) -> list[RenderableType]:
+    """Impulses with the names of their joints."""
+    table = plain_table(["impulse at", "time", "velocity change [m/s]", "along each axis [m/s]"], slice(1, 3))
+    for name, kick in kicks:
+        along = ", ".join(f"{value:.5g}" for value in kick.change)
+        when = lasting(kick.time, 6) if kick.time else "0 s"
+        table.add_row(name, when, f"{kick.size:.8g}", f"({along})")
+    return [Text("Impulses", "bold"), table]

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from dmoc.basics.digits import lasting
 from dmoc.reports.layout import pairs, plain_table
+from dmoc.reports.missions import impulses_table
 
 if TYPE_CHECKING:
     from dmoc.teams.solution import TeamSolution
@@ -36,4 +37,22 @@ def bodies_table(solution: TeamSolution) -> RenderableType:
             apart = solution.distance(first, second)
             when = float(solution.time[apart.argmin()])
             near.add_row(f"{first}, {second}", f"{apart.min():.6g}", lasting(when, 6) if when else "0 s")
-    return Group(Text("Bodies", "bold"), table, Text(), near)
+    parts: list[RenderableType] = [Text("Bodies", "bold"), table, Text(), near]
+    if hasattr(solution, "joints"):
+        parts += [Text(), *_phases(solution)]
+    return Group(*parts)
+
+
+def _phases(solution: Any) -> list[RenderableType]:
+    """Of a team of missions the phases of its clock, and the impulses of its bodies."""
+    table = plain_table(["phase", "begins", "lasts", "order", "steps", *solution.names], slice(1, 5))
+    for i, legs in enumerate(zip(*(one.legs for one in solution.members), strict=True)):
+        begin = legs[0].provenance.start_time
+        when = lasting(begin, 6) if begin else "0 s"
+        names = [leg.provenance.problem_name for leg in legs]
+        table.add_row(
+            str(i + 1), when, lasting(legs[0].duration, 6), str(legs[0].order), str(legs[0].steps), *names
+        )
+    pairs = zip(solution.names, solution.members, strict=True)
+    kicks = [(f"{kick.joint} of {name}", kick) for name, one in pairs for kick in one.impulses]
+    return [Text("Phases", "bold"), table, *([Text(), *impulses_table(kicks)] if kicks else [])]

@@ -26,6 +26,8 @@ LEAST_FALL = 1.5
 # or the sum of the errors of the steps, whichever is larger [-]: of seven problems on seven meshes each they
 # were off by 1.3 times that at most.
 AT_ONCE = 2.0
+# An impulse below this part of what stops the body counts as that [-]: less of it hardly moves the body.
+MOVES = 1e-4
 
 
 def change(
@@ -104,6 +106,23 @@ def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
     # Elsewhere the two differ by the rounding of |F| alone, which is counted by itself.
     idle = float(many.weights @ (paid - thrust) @ (h * switching))
     return abs(idle) / total if total else 0.0
+
+
+def rounded_share(dynamics: Dynamics, path: DiscretePath) -> float:
+    """The part of the impulse that is paid since |F| is rounded at zero, and not flown at any node [-].
+
+    Of an impulse that hardly moves the body, the part of one that does.
+    """
+    if dynamics.actuator.smoothing is None:
+        return 0.0
+    weights = path.duration * (np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order)))
+    anywhere = np.repeat(path.position[:1], len(path.control), axis=0)
+    thrust = np.linalg.norm(wrench_of(dynamics, anywhere, path.control), axis=1)
+    u = ca.SX.sym("u", path.control.shape[1])
+    paid = ca.Function("throttle", [u], [dynamics.actuator.throttle(u)])(path.control.T).full().ravel()
+    scales = path_scales(path)
+    moving = path.mass[0] * scales.speed if path.coordinates.speeds.any() else 0.0
+    return float(weights @ np.maximum(paid - thrust, 0.0) / max(weights @ paid, MOVES * moving, TINY))
 
 
 def rounding_cost(problem: TransferProblem, path: DiscretePath) -> float:

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
 from dmoc.basics.digits import lasting
-from dmoc.results.moments import moment, moment_of_legs
+from dmoc.results.moments import moment_of_legs
 
 if TYPE_CHECKING:
     from dmoc.results.facts import Level, Provenance
@@ -97,7 +97,7 @@ class Outcome:
         with the moment of each body by its name.
         """
         if hasattr(self, "members"):
-            return {name: moment(one, t) for name, one in zip(self.names, self.members, strict=True)}  # type: ignore[attr-defined]
+            return {name: one.at(t) for name, one in zip(self.names, self.members, strict=True)}  # type: ignore[attr-defined]
         return moment_of_legs(self, t)
 
     def table(self) -> Any:

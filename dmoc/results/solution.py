@@ -177,6 +177,11 @@ class Solution(Outcome):
         return np.hstack(self.path.attitudes) if self.path.attitudes else None
 
     @property
+    def parts(self) -> tuple[Any, ...]:
+        """Itself: what has legs or bodies has several of them."""
+        return (self,)
+
+    @property
     def final_mass(self) -> float:
         """Mass at the goal [kg]."""
         return float(self.path.mass[-1])

@@ -27,8 +27,8 @@ from dmoc.scene.attraction import Attraction
 from dmoc.scene.fits import check_acts_on, check_functions, turning_checked
 from dmoc.scene.systems import check_limited, check_links, check_pushed, of_system
 
-# A duration sits on a limit that is nearer than this part of the longest [-]: the solver keeps it so far away.
-SITS_ON = 1e-6
+# A duration sits on a limit that is nearer than this part of it [-]: the barrier keeps it so far away.
+SITS_ON = 1e-5
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ class TransferProblem(Named):
         """Which limit of a free duration a duration [s] sits on: "shortest", "longest" or None."""
         shortest, longest = self.duration_bounds
         below, above = duration - shortest, longest - duration
-        if not self.free_duration or min(below, above) > SITS_ON * longest:
+        if not self.free_duration or min(below, above) > SITS_ON * duration:
             return None
         return "shortest" if below < above else "longest"
 

@@ -13,10 +13,13 @@ from dmoc.basics.docstrings import Named
 from dmoc.legs.together import Together
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import snake
+from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
-# What a transfer is called that was given no name.
-UNNAMED = TransferProblem.__dataclass_fields__["name"].default
+# What transfers and missions are called that were given no name.
+UNNAMED = tuple(kind.__dataclass_fields__["name"].default for kind in (TransferProblem, Mission))
+# Durations are equal within this part of them [-].
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,10 @@ class Team(Named):
 
     Parameters
     ----------
-    members : sequence of TransferProblem
-        One a body, all of one dimension, start time and duration; a free duration is one for all of them. A
-        `Mission` of one leg without events counts as the transfer that it is.
+    members : sequence of TransferProblem or Mission
+        One a body, all of one dimension and start time. Transfers have one duration; a free one is the same for
+        all of them. Where some member is a mission of several legs, all last equally long, and legs end when
+        their own durations say.
     together : sequence of Together
         `Apart` and `Meet`.
     names : sequence of str
@@ -61,7 +65,7 @@ class Team(Named):
     def __post_init__(self) -> None:
         given = entries(self.members)
         if given is None or len(given) < 2:
-            raise ValueError(f"members must be two or more transfers; got {short(self.members)}")
+            raise ValueError(f"members must be two or more transfers or missions; got {short(self.members)}")
         checked(self, members=tuple(_member(i, one) for i, one in enumerate(given)))
         checked(self, names=self._checked_names())
         parts = (self.together,) if isinstance(self.together, Together) else entries(self.together)
@@ -69,6 +73,8 @@ class Team(Named):
             raise ValueError(f"together must be a sequence of dmoc.Apart and Meet; got {short(self.together)}")
         checked(self, together=tuple(parts))
         self._check_alike()
+        if self.phased:
+            self._check_durations()
         for part in self.together:
             self._check_between(part)
         self._check_ends()
@@ -79,19 +85,25 @@ class Team(Named):
         return self.members[0].dimension
 
     @property
-    def start_time(self) -> float:
-        """Time at the start [s]."""
+    def phased(self) -> bool:
+        """Whether some member is a mission of several legs, so that the clock has joints inside."""
+        return any(hasattr(one, "joints") for one in self.members)
+
+    @property
+    def start_time(self) -> Any:
+        """Time at the start [s], or the earliest and the latest one."""
         return self.members[0].start_time
 
     @property
     def free_duration(self) -> bool:
-        """Whether the duration is found by the optimisation."""
-        return self.members[0].free_duration
+        """Whether some duration is found by the optimisation."""
+        return any(one.free_duration for one in self.members)
 
     @property
     def duration_bounds(self) -> tuple[float, float]:
         """Shortest and longest duration [s]; equal if it is fixed."""
-        return self.members[0].duration_bounds
+        shortest, longest = zip(*(one.duration_bounds for one in self.members), strict=True)
+        return max(shortest), min(longest)
 
     @property
     def mass(self) -> float:
@@ -143,7 +155,7 @@ class Team(Named):
         found = given
         if not given:
             own = [one.name for one in self.members]
-            usable = UNNAMED not in own and len(set(own)) == count
+            usable = not {*UNNAMED} & {*own} and len(set(own)) == count
             found = tuple(own) if usable else tuple(f"body {i + 1}" for i in range(count))
         if len(found) != count or len(set(found)) < count:
             raise ValueError(f"names must be {count} words, each another one; got {short(found)}")
@@ -155,7 +167,7 @@ class Team(Named):
         facts = {
             "dimension": lambda one: (one.dimension, "axes"),
             "start_time": lambda one: (one.start_time, "s"),
-            "duration": lambda one: (one.duration, "s"),
+            "duration": lambda one: (0.0 if self.phased else one.duration, "s"),
             "objective's unit": lambda one: (one.objective.unit_with(one.actuator), ""),
             "objective's sense": lambda one: ("maximised" if one.objective.sense < 0 else "minimised", ""),
         }
@@ -168,6 +180,17 @@ class Team(Named):
                         f"{self.names[0]} has {short(other)}{' ' + unit if unit else ''}"
                     )
 
+    def _check_durations(self) -> None:
+        """All members last equally long, and one clock is common to their durations."""
+        shortest, longest = self.duration_bounds
+        if shortest > longest * (1 + SAME):
+            spans = [one.duration_bounds for one in self.members]
+            slow, fast = spans.index(max(spans)), spans.index(min(spans, key=lambda span: span[1]))
+            raise ValueError(
+                f"all bodies of a team last equally long, but {self.names[slow]} lasts at least {shortest:g} s "
+                f"and {self.names[fast]} at most {longest:g} s; change a duration of one of them"
+            )
+
     def _check_between(self, part: Together) -> None:
         for name in part.between:
             if name not in self.names:
@@ -179,6 +202,10 @@ class Team(Named):
         """Ends that are fixed can neither be moved apart nor together."""
         for part, a, b in self.pairs():
             both, kept = f"{self.names[a]} and {self.names[b]}", part.distance_kept
+            if part.meets and any(_turns_at_goal(self.members[i]) for i in (a, b)):
+                raise ValueError(
+                    f"{both} are to meet, but the velocity of one is turned at its goal; add a leg"
+                )
             start, goal = (self._gap(a, b, end, 0) for end in ("start", "goal"))
             for verb, place in (("start", start), ("end", goal)):
                 if (gap := float(np.linalg.norm(place))) < kept * (1 - 1e-9):
@@ -217,18 +244,25 @@ class Team(Named):
         return second - first
 
 
-def _member(index: int, given: Any) -> TransferProblem:
+def _turns_at_goal(one: Any) -> bool:
+    """Whether something at the goal of a mission changes the velocity without a push."""
+    return hasattr(one, "joints") and any(event.turns_velocity for event in one.joints[-1].events)
+
+
+def _member(index: int, given: Any) -> Any:
     one = getattr(given, "alone", None) or given
     if hasattr(one, "joints"):
-        raise ValueError(
-            f"members[{index}] is a mission of several legs, and a team takes transfers alone: state the leg "
-            "in which the bodies are together as a dmoc.TransferProblem"
-        )
-    if not isinstance(one, TransferProblem):
-        raise ValueError(f"members[{index}] must be a dmoc.TransferProblem; got {short(given)}")
+        for event in (event for joint in one.joints for event in joint.events):
+            if event.changes_frame:
+                raise ValueError(
+                    f"members[{index}] changes its frame on the way ({event.words()}), and distances are those "
+                    "in one frame: state all of its legs in the frame of the others"
+                )
+    elif not isinstance(one, TransferProblem):
+        raise ValueError(f"members[{index}] must be a dmoc.TransferProblem or Mission; got {short(given)}")
     if one.objective.learns:
         raise ValueError(f"members[{index}] has Information as its objective, which is one of a transfer alone")
-    if one.system is not None or one.links:
+    if getattr(one, "system", None) is not None or getattr(one, "links", None):
         raise ValueError(
             f"members[{index}] has links or several bodies of its own, and a body of a team has none; "
             "bodies that links join are one dmoc.System"

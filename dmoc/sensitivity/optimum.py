@@ -53,6 +53,11 @@ class Optimum:
 
         Opened, the constants of effects are parameters of it.
         """
+        if getattr(problem, "phased", False):
+            raise ValueError(
+                "sensitivities are those of a transfer, a mission, or a team of transfers, not of a team of "
+                "missions; solve the team again with other numbers"
+            )
         problem = with_open_effects(problem) if opened else problem
         if hasattr(problem, "plan") or hasattr(problem, "members"):
             return cls._of_mission(solution, problem)

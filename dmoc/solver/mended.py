@@ -17,6 +17,7 @@ from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import MISSED, goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.between import Cut, cuts
+from dmoc.results.estimate import rounded_share
 from dmoc.results.flown_cost import unpriced
 from dmoc.rungs.rung import Rung
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
@@ -35,6 +36,8 @@ ANOTHER = 0.05
 # An answer that misses the goal by less than this part of the path is near the one on a finer mesh [-]: all of
 # four such answers led there, in 1 to 4 iterations, and one in six of those that missed it by more.
 NEAR = 0.1
+# Where the rounding of |F| costs more than this part [-], |F| is rounded over a tenth, at most so many times.
+PAID, MOST_SHARPER = 1e-3, 4
 # Answers whose objectives differ by less than this part are one [-]: on one mesh Ipopt finds an optimum to
 # 1e-8.
 SAME_OBJECTIVE = 1e-6
@@ -181,6 +184,23 @@ def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
             return finer if finer.stopped else rung
         rung = finer
     return rung if rung is begun or MADE_FINER in rung.notes else _noted(rung, MADE_FINER)
+
+
+def onto_magnitude(ladder: Ladder, rung: Rung) -> Rung:
+    """An answer that hardly pays for the rounding of |F| at zero: it is rounded less where that costs much.
+
+    The width is a part of the largest thrust, so that one far above what a transfer takes is paid for on the
+    whole way: with 1e4 N for a transfer of 1 N s in 4 s that was a third of the cost.
+    """
+    for _ in range(MOST_SHARPER):
+        width = rung.problem.actuator.smoothing
+        if not rung.solved or width is None or rounded_share(ladder.dynamics, rung.path) <= PAID:
+            break
+        sharper = ladder.try_on(rung.path, 0.1 * width)
+        if not sharper.solved:
+            return sharper if sharper.stopped else rung
+        rung = replace(sharper, notes=rung.notes)
+    return rung
 
 
 def _unpriced(ladder: Ladder, rung: Rung) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
-from dmoc.guess.starting import guess_duration, starting_guess
+from dmoc.guess.starting import guess_duration, least_effort_to_orbit, starting_guess
 from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
@@ -98,12 +98,17 @@ def best_revolutions(ladder: Ladder, order: int | None, hold: bool) -> Rung | No
     if best is None or not best.pinned or best.gain < NOTHING_TO_GAIN:
         return best
     freed = led(ladder.try_on(best.path), ladder.ask, ladder.problem, best.path, ladder.try_on)
-    start = best.path
-    for lean in () if freed.solved or freed.stopped else HELD:
-        # Where the duration hardly matters Ipopt wanders off: held near the path it stays.
-        freed = ladder.try_on(start, lean=lean)
-        start = freed.path if freed.solved else start
+    # Where the duration hardly matters Ipopt wanders off.
+    freed = freed if freed.solved or freed.stopped else _held(ladder, best.path)
     return freed if freed.solved else best
+
+
+def _held(ladder: Ladder, start: DiscretePath) -> Rung:
+    """An answer near a path, by way of answers that are held near it less and less."""
+    for lean in HELD:
+        rung = ladder.try_on(start, lean=lean)
+        start = rung.path if rung.solved else start
+    return rung
 
 
 def _valleys(soundings: list[Sounding]) -> list[Sounding]:
@@ -139,7 +144,31 @@ def _shortest_alike(ladder: Ladder, best: Rung, soundings: list[Sounding], hold:
 def solved_from(ladder: Ladder, one: Sounding, order: int, hold: bool) -> Rung:
     """The problem itself from the path of least effort of one duration."""
     steps = max(COARSEST_NODES[True] // (order // 2), least_steps(ladder.problem, one.path))
-    return _sharpened(ladder, one.path.onto(uniform_mesh(steps), order, hold), one.pinned)
+    guess = one.path.onto(uniform_mesh(steps), order, hold)
+    rung = _sharpened(ladder, guess, one.pinned)
+    if rung.solved or rung.stopped or not np.isclose(one.cost, one.effort):
+        return rung
+    near = _without_limits(ladder, guess)
+    return rung if near is None else ladder.try_on(near, pinned=one.pinned)
+
+
+def _without_limits(ladder: Ladder, guess: DiscretePath) -> DiscretePath | None:
+    """The path of least effort on the mesh of a guess, if it keeps the limit, with its multipliers.
+
+    It is then an answer. From a guess alone the barriers of limits can lead far away from it.
+    """
+    problem, limit = ladder.problem, ladder.problem.actuator.force_limit()
+    free = replace(problem, duration=guess.duration, actuator=FreeForce(), objective=Effort())
+    start = replace(guess, control=guess.control[:, : problem.dimension])
+    rung = ladder.ask(free, start, "least effort on this mesh")
+    if not rung.solved or (limit or np.inf) < np.linalg.norm(rung.path.control, axis=1).max():
+        return None
+    control = controls_for(problem, rung.path.control)
+    if control is None:
+        return None
+    same = control.shape == rung.path.control.shape
+    known = {key: value for key, value in rung.path.multipliers.items() if same or key.group != "force"}
+    return replace(rung.path, control=control, multipliers=known)
 
 
 def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
@@ -179,13 +208,20 @@ def _durations(problem: TransferProblem) -> list[float]:
 
 
 def _sounding(ladder: Ladder, duration: float) -> Sounding | None:
-    """The path of least effort in a duration; None where it was not found in a few iterations."""
+    """The path of least effort in a duration; None where it was not found in a few iterations.
+
+    To an open place on an orbit Ipopt may wander along it, where a shot that knows the curvature does not.
+    """
     free = replace(ladder.problem, duration=duration, actuator=FreeForce(), objective=Effort())
     first = starting_guess(free, uniform_mesh(SOUNDING_STEPS), ORDER_OF_MANY_TURNS, False)
     steps = int(np.clip(least_steps(free, first), SOUNDING_STEPS, 5 * SOUNDING_STEPS))
     guess = starting_guess(free, uniform_mesh(steps), ORDER_OF_MANY_TURNS, False)
     ask = partial(ladder.ask, free, question=f"least effort in {lasting(duration, 6)}", most=MOST_SOUNDING)
-    rung = led(ask(guess), ladder.ask, free, guess, ask)
+    rung = ask(guess)
+    if not (rung.solved or rung.stopped):
+        shot = least_effort_to_orbit(free, guess.mesh, guess.order, False, duration)
+        rung = rung if shot is None else ask(shot)
+    rung = led(rung, ladder.ask, free, guess, ask)
     return promise(ladder.problem, rung) if rung.solved else None
 
 

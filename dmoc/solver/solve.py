@@ -17,7 +17,7 @@ from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
-from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_price, past_zones
+from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_magnitude, onto_price, past_zones
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.second_look import cheaper_revolutions
@@ -79,8 +79,9 @@ def _solved(
     problem = ladder.problem
     # To an orbit as a whole, durations hardly differ in cost: from a long one the refinement to a tolerance
     # wanders (89 s instead of 7 s in one case), and no revolution is there to be missed.
+    # Without limits the soundings are answers, and a guess may lead to one that is a hundred times as dear.
     anchored = problem.start.anchored and problem.goal.anchored
-    tried = guess is None and mesh is None and (anchored or tol is None)
+    tried = guess is None and mesh is None and (anchored or tol is None or not problem.limited)
     best = best_revolutions(ladder, order, hold) if tried else None
     if best is not None:
         guess = best.path
@@ -100,7 +101,7 @@ def _solved(
         if is_open:
             rung = onto_goal(ladder, rung, first, given, order, pinned)
             rung = onto_price(ladder, rung, pinned)
-        return rung
+        return onto_magnitude(ladder, rung)
 
     rung = mended(rung)
     if guess is None and mesh is None:

@@ -1,75 +1,24 @@
-"""From an accuracy to a mesh: how large the error is, where it arises, and the steps that bring it down."""
+"""From an accuracy to an answer: a trial on a coarse mesh, the order that pays, and finer meshes from there."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from dmoc.ipopt.run import STATUSES
 from dmoc.meshes.choices import TRIAL_ORDER, best_order, is_uneven, trial_path, with_as_many_nodes
-from dmoc.meshes.cuts import PARTS, SHORTEST, cut, cuts_of
 from dmoc.meshes.smooth import finer, smooth_path
-from dmoc.motion.path import DiscretePath
-from dmoc.results.estimate import (
-    LEAST_FALL,
-    change,
-    estimate,
-    estimate_at_once,
-    local_errors,
-    rounding_cost,
-)
-from dmoc.results.facts import Error, off_optimum
-from dmoc.results.flown_cost import TINY
-from dmoc.results.solution import NOT_MET, Solution
-from dmoc.results.switches import corners, has_linear_controls, is_singular, switches_in_words
-from dmoc.rungs.rung import Rung, at_rest
-from dmoc.scene.problem import TransferProblem
+from dmoc.results.solution import Solution
+from dmoc.results.switches import is_singular
 from dmoc.solver.flat import flat_optimum
-from dmoc.solver.ladder import Ladder
+from dmoc.solver.ladder import UNEXPLAINED, Ladder
 from dmoc.solver.mended import on_shorter_steps, past_zones
+from dmoc.solver.refinement import Refinement
 from dmoc.solver.second_look import cheaper_revolutions
 
-# Refinement ends on a mesh of more nodes than this, which bounds time and memory.
-MOST_NODES = 200_000
+# Where the second mesh leads nowhere, a solve begins anew on so many times the steps of the first.
+MORE = 3
 # A smooth transfer is solved on so many meshes, each as fine as the error of the one before asks for.
 MOST_AT_ONCE = 2
-# Refinement ends after this many meshes: steps at a switch have then come down to the shortest.
-MOST_MESHES = 14
-# The rounding of |F| may cost this part of the tolerance.
-ROUNDING_SHARE = 0.5
-# An attempt with |F| rounded less is given up after this many iterations: it takes 20 to 100 or leads nowhere.
-MOST_SHARPENING = 200
-# |F| is not rounded over less than this part of the largest thrust: its curvature there is one over that.
-LEAST_ROUNDING = 1e-8
-# Durations are equally good if a change by this part of them costs, to first order, at most the tolerance [-].
-EQUALLY_GOOD = 0.1
-# Where the cost is linear in controls and its optimum flat, an answer is held near that on the mesh before, by
-# so many times the tolerance [-]: seven flat optima then met tolerances that none had met.
-HELD = 10.0
-# An answer is held by no more than this [-]: it would keep switches from their places.
-MOST_HELD = 1e-3
-# Paths cost the same if their costs differ by less than this part of the tolerance [-].
-SAME_COST = 0.3
-# Where the cost changes more than the path, and that falls by less than this factor from mesh to mesh [-],
-# all steps are cut, and not those alone that make the error of the path.
-SLOW = 2.0
-# An optimum is flat if the cost changes by less than this times what the path changes from mesh to mesh [-].
-FLAT = 0.03
-# Costs below this part of the unit of cost are nothing [-]: a target may be met by a coast alone.
-NOTHING = 1e-3
-# A refinement of more iterations than this wanders: others take 20 to 90.
-LONG = 100
-# One that is not held ends after this many: then it is tried anew, and held.
-LONGEST_FREE = 150
-# A path of settled cost that still changes is held so many times as strongly on the next mesh [-].
-TIGHTER = 10.0
-# A mesh does no better if its change is more than this part of the one before [-]: estimates go up and down.
-FALLING = 0.95
-# After this many meshes that do no better the best one is the answer: steps have come down to rounding.
-PATIENCE = 2
 
 
 def climb_to_tolerance(
@@ -107,7 +56,7 @@ def climb_to_tolerance(
         if not trial.solved:
             return ladder.solution(trial, tolerance=tol)
     local = not is_singular(ladder.problem, path)
-    refinement = _Refinement(ladder, tol, local, reason)
+    refinement = Refinement(ladder, tol, local, reason)
     # Close past an attractor one mesh does not tell its own error: the cost of a flyby was six times as far off
     # as its steps and the miss of the goal said.
     at_once = smooth and not is_uneven(ladder.problem, path)
@@ -118,165 +67,11 @@ def climb_to_tolerance(
             mesh = finer(trial.path, refinement.errors[trial.number], tol)
             again = ladder.solve_on(trial.path.onto(mesh, order, hold))
             trial = again if again.solved else trial
-    return refinement.of(trial, order, hold)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """An answer on one mesh, and its estimated error."""
-
-    rung: Rung
-    error: Error
-
-
-class _Refinement:
-    """The meshes after the first, each a refinement of the one before, and the best answer so far."""
-
-    def __init__(self, ladder: Ladder, tol: float, local: bool, reason: str):
-        self.ladder, self.problem, self.tol = ladder, ladder.problem, tol
-        self.local, self.reason, self.off = local, reason, off_optimum(tol)
-        self.changes: list[tuple[float, float]] = []
-        self.errors: dict[int, float] = {}
-        self.best: _Found | None = None
-        self.rounded, self.flat, self.lean, self.worse = 0.0, False, 0.0, 0
-        self.linear = has_linear_controls(ladder.problem)
-
-    def of(self, rung: Rung, order: int, hold: bool) -> Solution:
-        """Refine from a first answer until the tolerance is met or nothing is gained any more."""
-        longest = np.diff(rung.nlp.mesh).max()
-        if rung.pull > 0:
-            self.lean = min(HELD * self.tol, MOST_HELD)
-        while True:
-            coarse, cost = rung.path, rung.level.objective
-            parts, most = self._cuts(coarse, cost, longest)
-            rung = self._refined(coarse.onto(cut(coarse.mesh, parts), order, hold))
-            if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
-                if self.best is None or rung.stopped:
-                    return self.ladder.solution(rung, self.errors, tolerance=self.tol)
-                return self.settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
-            if not self.changes and rung.pull > self.off:
-                rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)
-            fine = rung.path
-            now, least = (fine, rung.level.objective), NOTHING * rung.nlp.units.cost
-            self.changes.append(change(self.problem, (coarse, cost), now, parts, least))
-            self._hold_if_flat(rung)
-            if rung.pinned and not self.flat:
-                self.flat = True
-                self.reason += "; durations cost the same, one was kept"
-            met = self._judge(rung, fine, most)
-            if met and rung.pull > self.off:
-                rung = self._released(rung)
-                self.best = None if rung.pull <= self.off else self.best
-                met = self._judge(rung, rung.path, most) and rung.pull <= self.off
-            if met:
-                self._sharpen(rung, most)
-            if met or len(fine.position) > MOST_NODES or len(self.changes) == MOST_MESHES:
-                return self.settled(self.reason)
-            if self.worse == PATIENCE:
-                return self.settled(f"{self.reason}; finer meshes did no better")
-
-    def meets_at_once(self, rung: Rung) -> bool:
-        """Whether an answer of a smooth problem meets the tolerance without a second mesh."""
-        found = estimate_at_once(self.problem, self.ladder.dynamics, rung.path, rung.level.objective)
-        self.errors[rung.number] = found.largest
-        self.best = _Found(rung, found) if found.largest <= self.tol else None
-        return self.best is not None
-
-    def _refined(self, start: DiscretePath) -> Rung:
-        """An answer on a finer mesh; where that wanders among paths that cost the same, one that is held."""
-        if self.linear and not self.lean:
-            rung = self.ladder.try_on(start, most=LONGEST_FREE, pinned=self.flat)
-            if rung.solved or rung.stopped:
-                return rung
-            self.lean = min(HELD * self.tol, MOST_HELD)
-        return self.ladder.refine_on(start, self.flat, self.lean)
-
-    def _hold_if_flat(self, rung: Rung) -> None:
-        """Hold the answers to come near the one before if the path changes and the cost does not."""
-        moved, cost = self.changes[-1]
-        wanders = len(self.changes) > 1 and LEAST_FALL * moved > self.changes[-2][0]
-        flat = cost < FLAT * moved or wanders or rung.answer.iterations > LONG
-        if self.linear and moved > self.tol and flat:
-            tighter = TIGHTER * self.lean if wanders and cost < SAME_COST * self.tol else self.lean
-            self.lean = max(tighter, min(HELD * self.tol, MOST_HELD))
-
-    def _cuts(self, path: DiscretePath, objective: float, longest: float) -> tuple[np.ndarray, float]:
-        """Into how many parts to cut each step, and by how much the error falls then at most.
-
-        Where a control jumps the error falls with the length of the step there alone.
-        """
-        if not self.local:
-            return np.full(len(path.mesh) - 1, 2), 2.0
-        wanted = max(longest / PARTS ** (len(self.changes) + 1), SHORTEST)
-        errors = local_errors(self.ladder.dynamics, path, self.problem.start_time)
-        places = corners(self.problem, path, objective)
-        most = PARTS - 1.0 if len(places) else 2.0 ** (2 if path.hold else path.order)
-        fall = max(self.changes[-2]) / max(*self.changes[-1], TINY) if len(self.changes) > 1 else np.inf
-        slow = fall < SLOW and self.changes[-1][1] > self.changes[-1][0]
-        return cuts_of(path, errors, places, wanted, 2 if slow else 1), most
-
-    def _judge(self, rung: Rung, path: DiscretePath, most: float) -> bool:
-        """Estimate the error of an answer and keep it if it is the best; whether it meets the tolerance.
-
-        The cost of the rounding of |F| counts in the error, but not in whether the tolerance is met: no mesh
-        brings it down.
-        """
-        found = estimate(self.problem, self.ladder.dynamics, path, rung.level.objective, self.changes, most)
-        met = found.largest <= self.tol
-        rounded = rounding_cost(self.problem, path) / max(abs(rung.level.objective), TINY)
-        found = replace(found, objective=found.objective + rounded)
-        self.errors[rung.number] = found.largest
-        if self.best is None or found.largest < self.best.error.largest:
-            self.best, self.worse = _Found(rung, found), 0
-        elif max(self.changes[-1]) > FALLING * max(self.changes[-2:][0]):
-            self.worse += 1
-        self.rounded = rounded
-        return met
-
-    def _released(self, rung: Rung) -> Rung:
-        """An optimum on the same mesh; another path of the same cost is no error of the mesh."""
-        if (found := at_rest(self.ladder.try_on, rung, self.lean, self.tol)) is rung:
-            return rung
-        before, after = ((one.path, one.level.objective) for one in (rung, found))
-        moved = change(self.problem, before, after, np.ones(len(found.nlp.mesh) - 1, int))
-        if moved[1] > SAME_COST * self.tol:
-            self.changes[-1] = (self.changes[-1][0] + moved[0], self.changes[-1][1] + moved[1])
-        elif moved[0] > self.tol:
-            self.reason += f"; paths that differ by {moved[0]:.1g} of the extent cost the same"
+    found = refinement.of(trial, order, hold)
+    limited = any("max_" in name for name in ladder.options or ())
+    if refinement.best is not None or found.status not in UNEXPLAINED or limited:
         return found
-
-    def _sharpen(self, rung: Rung, most: float) -> None:
-        """Where the rounding of |F| alone costs more than the tolerance, round it less on the same mesh."""
-        width = self.problem.actuator.smoothing
-        while width is not None and self._rounded_too_much() and width > LEAST_ROUNDING:
-            share = 0.5 * ROUNDING_SHARE * self.tol / self.rounded
-            width = max(width * min(max(share, 0.1), 0.5), LEAST_ROUNDING)
-            sharper = self.ladder.try_on(rung.path, width, MOST_SHARPENING)
-            if not sharper.solved:
-                return
-            rung, self.problem = sharper, sharper.problem
-            self._judge(rung, rung.path, most)
-            self.reason += f"; |F| rounded over {width:.0e} of the largest thrust"
-
-    def _rounded_too_much(self) -> bool:
-        over = self.best is not None and self.best.error.largest > self.tol
-        return self.rounded > 0 and (over or self.rounded > ROUNDING_SHARE * self.tol)
-
-    def settled(self, reason: str) -> Solution:
-        """The best answer that was found, which need not be the last one."""
-        assert self.best is not None
-        words = _words(self.problem, self.best.rung.path, reason)
-        more = {"tolerance": self.tol, "error": self.best.error, "reason": words}
-        solution = self.ladder.solution(self.best.rung, self.errors, **more)
-        reached = self.best.error.largest
-        if reached <= self.tol:
-            return solution
-        told = f"the estimated error is {reached:.1e}, you asked for {self.tol:g}; {STATUSES[NOT_MET].advice}"
-        return replace(solution, success=False, status=NOT_MET, message=told)
-
-
-def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:
-    """Such as: order 4, 145 steps: controls switch or limits set in; switches at 0.06, 4.45 s."""
-    found = switches_in_words(problem, path)
-    words = f"order {path.order}, {len(path.mesh) - 1} steps: {reason}"
-    return f"{words}; switches at {found}" if found else words
+    # The second mesh led nowhere from the answer on the first one: begin anew, on as many steps.
+    first = trial_path(ladder.problem, order, MORE * (len(trial.nlp.mesh) - 1), hold, guess)
+    trial = flat_optimum(ladder, first, tol) or ladder.climb_to(first, guess)
+    return Refinement(ladder, tol, local, reason).of(trial, order, hold) if trial.solved else found

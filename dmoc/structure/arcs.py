@@ -125,6 +125,19 @@ def surely_seen(arcs: tuple[Arc, ...], solution: Solution) -> tuple[Arc, ...]:
     return tuple(left)
 
 
+def without_waiting(arcs: tuple[Arc, ...]) -> tuple[Arc, ...]:
+    """The arcs without a coast at the begin or the end.
+
+    Where one is worth its time after all, the switching function finds that it is missing.
+    """
+    first, last = int(arcs[0].kind == COAST), len(arcs) - int(arcs[-1].kind == COAST)
+    if last - first < 2 or arcs[last - 1].touches is not None:
+        return arcs
+    begin, end = (arcs[0].end if first else 0.0), arcs[last - 1].end
+    left = [arc._replace(end=(arc.end - begin) / (end - begin)) for arc in arcs[first:last]]
+    return (*left[:-1], left[-1]._replace(end=1.0))
+
+
 def joined(arcs: Iterable[Arc]) -> tuple[Arc, ...]:
     """Neighbours that are alike, and have no touch between them, are one arc."""
     left: list[Arc] = []
@@ -168,6 +181,9 @@ def _merged(
         middle = 0.5 * (begin + end)
         kind = next(kind for kind, last in cuts if middle <= last)
         along = next((one for first, last, one in follows if first <= middle <= last), None)
+        if along in kept and kind in (BURN, COAST):
+            # What keeps the speed at its limit is between nothing and full.
+            kind = SINGULAR
         arcs.append(Arc(kind, end, along, touch))
         begin = end
     return tuple(arcs)

@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.basics.numerics import cubic_spline
 from dmoc.chains.path import MissionPath
 from dmoc.legs.legs import Coast, Leg
-from dmoc.missions.guess import mesh_around
+from dmoc.missions.meshes import mesh_around
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
@@ -77,7 +77,8 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
     if arc.kind == BURN:
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
-    degree = SINGULAR_DEGREE if arc.kind == SINGULAR else None
+    # Where a speed is kept to, that says what the control is.
+    degree = SINGULAR_DEGREE if arc.kind == SINGULAR and not is_of_speed(problem, arc.follows) else None
     sides = sides_of(problem, arc.kind)
     kept = problem.actuator.kept(sides) if any(sides) else None
     linear = names_of(problem) and not is_of_speed(problem, arc.follows)

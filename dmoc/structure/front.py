@@ -30,8 +30,13 @@ if TYPE_CHECKING:
 MISSION = "dmoc mission"
 # A file of a team says that it has this one.
 TEAM = "dmoc team"
+# A file of a team of missions says that it has this one.
+PHASED = "dmoc team of missions"
 # Below this tolerance [-] structure pays by itself: steps cut at switches reach it in seconds, and hardly more.
 TIGHT = 1e-5
+# With a free duration it pays up to this one [-]: paths that differ in it cost the same, and steps are cut for
+# minutes where legs take seconds.
+TIGHT_IF_FREE = 1e-4
 
 
 @overload
@@ -115,7 +120,8 @@ def solve(
     nothing switches, so that the full order of the scheme is had. `order` and `steps` are then those of the
     coarse answer. The answer is a MissionSolution; where that does not succeed, or there is one arc alone, it
     is as without. Where a tolerance below 1e-5 is all that is asked for, and an engine or a zone may switch,
-    this is tried by itself; not with `structure=False`.
+    this is tried by itself, and for a switched engine in a free time up to a tolerance of 1e-4; not with
+    `structure=False`.
 
     Parameters
     ----------
@@ -172,10 +178,14 @@ def solve(
     if impulses not in (None, "auto"):
         raise ValueError(f"impulses must be 'auto' or not given; got {short(impulses)}")
     if hasattr(stated, "together"):
-        from dmoc.teams.climb import solve_team
-
         if structure or impulses is not None:
             raise ValueError("structure and impulses are of one transfer or mission; a dmoc.Team has neither")
+        if stated.phased:
+            from dmoc.phases.climb import solve_phased
+
+            return solve_phased(stated, order, steps, tol, hold, mesh, guess, *rest)
+        from dmoc.teams.climb import solve_team
+
         return solve_team(stated, order, steps, tol, hold, mesh, guess, *rest)
     if not hasattr(stated, "joints"):
         if impulses is not None:
@@ -204,12 +214,13 @@ def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
     if (
         hold is not False
         or any(part is not None for part in chosen)
-        or not (isinstance(tol, float) and 0 < tol < TIGHT)
+        or not (isinstance(tol, float) and 0 < tol <= TIGHT_IF_FREE)
+        or not (tol < TIGHT or getattr(problem, "free_duration", False))
     ):
         return False
-    from dmoc.structure.solve import has_switches
+    from dmoc.structure.solve import can_be_parted, has_switches, is_switched
 
-    return has_switches(problem)
+    return has_switches(problem) if tol < TIGHT else is_switched(problem) and can_be_parted(problem)
 
 
 def _by_structure(
@@ -236,6 +247,10 @@ def verify(
 ) -> Report:
     if problem is None and getattr(solution, "problem", solution) is None:
         solution = attached_as_named(solution)
+    if hasattr(solution, "joints"):
+        from dmoc.phases.checks import verify_phased
+
+        return verify_phased(solution, problem, more)  # type: ignore[arg-type]
     if hasattr(solution, "members"):
         from dmoc.teams.checks import verify_team
 
@@ -260,6 +275,10 @@ def load(path: str | os.PathLike) -> Any:
         from dmoc.teams.solution import read_team
 
         return read_team(path)
+    if kind == PHASED:
+        from dmoc.phases.solution import read_phased
+
+        return read_phased(path)
     if kind != MISSION:
         return transfers.load(path)
     from dmoc.missions.solution import read_mission

@@ -21,7 +21,7 @@ from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.solve import check_numerics, solve
-from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen
+from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen, without_waiting
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
@@ -48,6 +48,8 @@ MOST_ROUNDS = 10
 NEAR = (1e-9, 1e-6), (1e-4, 1e-2)
 # An answer that costs more than the coarse one by over this part of it [-] is another optimum, or none.
 WORSE = 0.1
+# Without the coasts at its ends an answer may cost this part more [-], as much as the coarse mesh is off.
+SAME_COST = 1e-3
 # An attempt from nearly the answer ends after this many iterations, on arcs of a second coarse answer after
 # that many.
 MOST_ITERATIONS, PATIENT = 100, 250
@@ -96,10 +98,10 @@ def solve_by_structure(
     return None if otherwise is None else _better(found, otherwise())
 
 
-def _is_dear(found: MissionSolution, coarse: Solution) -> bool:
+def _is_dear(found: MissionSolution, coarse: Solution, part: float = WORSE) -> bool:
     """Whether an answer costs so much more than the coarse one that another optimum may be better."""
     sense = coarse.require_problem().objective.sense
-    return found.optimal and sense * (found.objective - coarse.objective) > WORSE * abs(coarse.objective)
+    return found.optimal and sense * (found.objective - coarse.objective) > part * abs(coarse.objective)
 
 
 def _better(found: MissionSolution, other: Solution) -> MissionSolution | Solution:
@@ -116,20 +118,27 @@ def _by_arcs(
     most: int = MOST_ITERATIONS,
 ) -> MissionSolution | None:
     """The answer as a mission of the arcs of a coarse one; an attempt ends after `most` iterations."""
-    arcs, legs = arcs_of(coarse), (coarse,)
+    arcs = arcs_of(coarse)
     if most > MOST_ITERATIONS:
         arcs = surely_seen(arcs, coarse)
     if len(arcs) == 1 and arcs[0].alike == (FREE, None):
         return None
     numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
-    climb = Climb(mission_of(problem, arcs), *numerics)
-    climb.sharp = True
-    climb.levels.extend(coarse.ladder)
-    with climb.interrupt:
-        found = _improved(climb, problem, arcs, legs, tol, most)
-    if found is None or found.status in ENDED:
-        return found
-    return found if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok else None
+    # To wait at either end may cost nothing: of legs that may last as long as they like Ipopt finds no optimum.
+    moving = without_waiting(arcs) if problem.free_duration and not problem.goal.anchored else arcs
+    for these, dearer in ((arcs, np.inf), (moving, SAME_COST))[: 1 if moving == arcs else 2]:
+        climb = Climb(mission_of(problem, these), *numerics)
+        climb.sharp = True
+        climb.levels.extend(coarse.ladder)
+        with climb.interrupt:
+            found = _improved(climb, problem, these, (coarse,), tol, most)
+        if found is None or _is_dear(found, coarse, dearer):
+            continue
+        if found.status in ENDED:
+            return found
+        if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok:
+            return found
+    return None
 
 
 def _is_settled(found: MissionSolution, coarse: int) -> bool:
@@ -145,12 +154,11 @@ def _is_settled(found: MissionSolution, coarse: int) -> bool:
 
 
 def can_be_parted(problem: TransferProblem) -> bool:
-    """Whether arcs can be seen: of one body that does not turn, without a limit on speed where it coasts."""
+    """Whether arcs can be seen: of one body that does not turn, in few revolutions."""
     return not (
         problem.turns
         or problem.links
         or any(part.turns_body or part.point for part in problem.constraints)
-        or (is_switched(problem) and any(part.limits_speed for part in problem.constraints))
         or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
     )
 

@@ -61,7 +61,13 @@ def simulate_team(team: Team, solution: Any = None, *given: Any, **more: Any) ->
         parts = solution.attach(team).members
     else:
         raise ValueError(f"solution must be a TeamSolution; got {short(solution)}")
-    flights = [march.simulate(one, mine, *given, **more) for one, mine in zip(team.members, parts, strict=True)]
+    flights = [
+        # A body with several legs is marched as a mission, one that is cut where others have joints.
+        flown_mission(getattr(mine, "problem", one), mine)
+        if hasattr(one, "joints") or hasattr(mine, "legs")
+        else march.simulate(one, mine, *given, **more)
+        for one, mine in zip(team.members, parts, strict=True)
+    ]
     return dict(zip(team.names, flights, strict=True))
 
 

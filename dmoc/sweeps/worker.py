@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 MULTIPLIER = "multiplier "
 # What belongs to the joints of a mission's path, or stands between the bodies of a team.
 JOINTS = ("own", "forces", "densities")
+# What a path of a team of missions knows of its bodies.
+PHASES = ("names", "joints")
 # A process solves one point at a time, also where a scheduler runs several threads in it: the output of a
 # point is redirected, which is done for the whole process.
 _TURN = threading.Lock()
@@ -96,6 +98,7 @@ def pack(path: Any) -> str:
         kinds = [name for name in JOINTS if hasattr(path, name)]
         joints = {name: {key: known.tolist() for key, known in getattr(path, name).items()} for name in kinds}
         facts = {"begins": path.begins, "idle": path.idle}
+        facts |= {name: getattr(path, name) for name in PHASES if hasattr(path, name)}
         return json.dumps({"legs": [pack(leg) for leg in path.legs], **facts, **joints})
     arrays = {name: getattr(path, name) for name in ("mesh", "position", "control", "mass")}
     arrays |= {name: getattr(path, name) for name in ("start_velocity", "goal_velocity")}
@@ -119,6 +122,12 @@ def unpack(text: str) -> Any:
         joints = {name: {key: np.array(known) for key, known in held[name].items()} for name in kinds}
         facts: Any = {"idle": tuple(held.get("idle", ()))} | joints
         legs, begins = tuple(map(unpack, held["legs"])), tuple(held["begins"])
+        if "joints" in held:
+            from dmoc.phases.order import Place
+            from dmoc.phases.path import PhasedPath
+
+            order = tuple(tuple(Place(*place) for place in group) for group in held["joints"])
+            return PhasedPath(legs, begins, **facts, names=tuple(held["names"]), joints=order)
         if "densities" in kinds:
             from dmoc.teams.path import TeamPath
 
@@ -208,19 +217,17 @@ def _efforts(solution: Any) -> dict[str, float]:
     from dmoc.motion.mesh import node_weights
 
     effort = impulse = 0.0
-    parts: Any = getattr(solution, "members", None) or getattr(solution, "legs", (solution,))
-    for leg in parts:
+    for leg in solution.parts:
         path = leg.path
         weights = np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order))
         size = np.linalg.norm(leg.force, axis=1)
         effort += float(0.5 * path.duration * weights @ size**2)
         impulse += float(path.duration * weights @ size)
-    for kick in getattr(solution, "impulses", ()):
-        # The mass before it: of the leg that ends there or, at the start, of the whole.
-        before = [leg.final_mass for leg in solution.legs if leg.time[-1] <= kick.time] or [
-            solution.problem.mass
-        ]
-        impulse += before[-1] * kick.size
+    for one in getattr(solution, "members", (solution,)):
+        for kick in getattr(one, "impulses", ()):
+            # The mass before it: of the leg that ends there or, at the start, of the whole.
+            before = [leg.final_mass for leg in one.legs if leg.time[-1] <= kick.time] or [one.problem.mass]
+            impulse += before[-1] * kick.size
     return {"effort": effort, "impulse": impulse}
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from dmoc.basics.digits import lasting
 from dmoc.ipopt.run import STATUSES
 from dmoc.missions.answer import costs_of, worst_rows
+from dmoc.results.between import Cut
 from dmoc.results.facts import Error, Provenance
 from dmoc.results.solution import NOT_MET, part_solution
 from dmoc.rungs.rung import cut_short
@@ -33,7 +34,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     team, program, answer = climb.mission, attempt.program, attempt.answer
     path, status, success = attempt.path, answer.status, attempt.solved
     message = "a local optimum" if success else climb.reason or STATUSES[status].advice
-    if success and (broken := _run_through(team, path)):
+    if success and (broken := run_through(team_cuts(team, path))):
         status, success, message = "infeasible", False, broken
     if success and not met:
         status, success = NOT_MET, False
@@ -70,7 +71,7 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
         status,
         message,
         tuple(climb.levels),
-        worst=() if success else _worst(team, worst_rows(program, answer, path)),
+        worst=() if success else in_distances(team, worst_rows(program, answer, path)),
         warnings=_warnings(team, path) if success else (),
         tolerance=tol,
         error=error,
@@ -79,16 +80,19 @@ def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: flo
     )
 
 
-def _worst(team: Team, rows: Sequence[tuple[str, float, str]]) -> tuple[tuple[str, float, str], ...]:
+def in_distances(team: Any, rows: Sequence[tuple[str, float, str]]) -> tuple[tuple[str, float, str], ...]:
     """Violated rows with those at the nodes of two bodies as what they lack of their distance [m]."""
     kept = {
-        f"{name}[": limit
+        name: limit
         for name, (part, *_) in zip(team.pair_names(), team.pairs(), strict=True)
         if (limit := part.limit(team.dimension)) is not None
     }
     found = []
     for name, size, unit in rows:
-        limit = next((limit for start, limit in kept.items() if name.startswith(start)), None)
+        begins = (
+            (begin, limit) for begin, limit in kept.items() if name.startswith((f"{begin}[", f"{begin} in "))
+        )
+        limit = next((limit for _, limit in begins), None)
         found.append((name, *((size, unit) if limit is None else limit.violation(size, ""))))
     return tuple(found)
 
@@ -103,9 +107,9 @@ def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
     return (*found, *cautions_of(team))
 
 
-def _run_through(team: Team, path: TeamPath) -> str:
+def run_through(cuts: Iterable[Cut]) -> str:
     """What two bodies break between nodes by running through each other there, in words; empty if nothing."""
-    cuts = [cut for cut in team_cuts(team, path) if len(cut.steps)]
+    cuts = [cut for cut in cuts if len(cut.steps)]
     if not cuts:
         return ""
     worst = max(cuts, key=lambda cut: cut.value)

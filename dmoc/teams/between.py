@@ -70,9 +70,19 @@ class BetweenBodies:
         return self._kernels[key]
 
     def _add(
-        self, name: str, kind: str, rows: Sequence[Row], at: np.ndarray, made: Kernel, gap: np.ndarray
+        self,
+        name: str,
+        kind: str,
+        rows: Sequence[Row],
+        at: np.ndarray,
+        made: Kernel,
+        gap: np.ndarray,
+        late: int = 0,
     ) -> None:
-        """A group of rows and its block; `gap` is by how much the origins of two bodies differ [m]."""
+        """A group of rows and its block; `gap` is by how much the origins of two bodies differ [m].
+
+        The first `late` of them ask for nothing.
+        """
         units, count = self.legs[0].program.units, at.shape[1]
         scale = np.array([[1 / units.of(row.unit) for row in rows]])
         low, high = (
@@ -83,6 +93,7 @@ class BetweenBodies:
         row, column = (np.array(part, int) for part in made.jacobian.get_triplet())
         loose = np.zeros((len(rows), count), bool)
         np.logical_or.at(loose, row, ~self._fixed[at[column]])
+        loose[:, :late] = False
         low[~loose.T], high[~loose.T] = -np.inf, np.inf
         labels, told = [row.name for row in rows], [row.unit for row in rows]
         self.rows = self.rows.add(name, kind, labels, count, scale, None, told)

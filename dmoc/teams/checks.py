@@ -58,8 +58,9 @@ def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
     """What holds between two bodies: the excess that is the largest part of what is allowed."""
     team, path = solution.require_problem(), solution.path
     found = [Excess(cut.name, cut.value, cut.allowed, cut.unit) for cut in team_cuts(team, path)]
+    speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in bodies]
     for name, (part, a, b) in zip(team.pair_names(), team.pairs(), strict=True):
-        found += _rows_between(name, part, (bodies[a], bodies[b]))
+        found += rows_between(name, part, (bodies[a], bodies[b]), speeds[b] - speeds[a])
     durations = np.array([one.duration for one in path.legs])
     found.append(Excess("common duration", float(np.ptp(durations)), BOUND * path.duration, "s"))
     shortest, longest = team.duration_bounds
@@ -70,19 +71,24 @@ def _together(solution: TeamSolution, bodies: Sequence[Evidence]) -> Check:
     return Check.of("together", worst.value, worst.allowed, worst.unit, note)
 
 
-def _rows_between(name: str, part: Any, pair: tuple[Evidence, Evidence]) -> Iterator[Excess]:
-    """The rows of a part for two bodies: at the end, and at the nodes if no limit of it was looked at there."""
+def rows_between(
+    name: str, part: Any, pair: tuple[Evidence, Evidence], drift: np.ndarray | None
+) -> Iterator[Excess]:
+    """The rows of a part for two bodies: at the nodes, if no limit of it was looked at there, and at the end.
+
+    `drift` is the velocity of one from the other at the end [m/s], None where the end is not theirs.
+    """
     first, second = pair
     sizes = {"m": max(one.extent for one in pair), "m/s": max(one.speed for one in pair)}
     apart = second.path.place - first.path.place
-    speeds = [one.path.goal_velocity[one.path.coordinates.speeds] for one in pair]
     q, v = (ca.SX.sym(of, apart.shape[1]) for of in "qv")
-    for rows, places, drift, where in (
-        (part.rows(q) if part.limit(q.numel()) is None else [], apart, np.zeros_like(apart), " at nodes"),
-        (part.goal_rows(q, v), apart[-1:], (speeds[1] - speeds[0])[None], ""),
-    ):
+    at_nodes = part.rows(q) if part.limit(q.numel()) is None else []
+    asked = [(at_nodes, apart, np.zeros_like(apart), " at nodes")]
+    if drift is not None:
+        asked.append((part.goal_rows(q, v), apart[-1:], drift[None], ""))
+    for rows, places, speeds, where in asked:
         for row in rows:
-            have = ca.Function("row", [q, v], [ca.densify(ca.SX(row.expression))])(places.T, drift.T).full()
+            have = ca.Function("row", [q, v], [ca.densify(ca.SX(row.expression))])(places.T, speeds.T).full()
             beyond = float(np.max(np.maximum(row.lower - have, have - row.upper), initial=0.0))
             allowed = BOUND * sizes.get(row.unit, 1.0)
             yield Excess(f"{name} {row.name}{where}", beyond, allowed, row.unit or "-")

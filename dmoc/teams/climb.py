@@ -11,7 +11,7 @@ import numpy as np
 from dmoc.chains.path import cold
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.climb import Climb
-from dmoc.missions.guess import mesh_around
+from dmoc.missions.meshes import mesh_around
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
 from dmoc.parts.objectives import Effort
@@ -52,17 +52,24 @@ class TeamClimb(Climb):
         """
         error = super()._error(attempt, changes, summed)
         path: Any = attempt.path
-        if not len(path.touched()):
+        if not path.touches:
             return error
         return replace(error, objective=max(changes[-1], *[0.25 * change for change in changes[-2:-1]], 0.0))
+
+    def cut_at_leaps(self, path: Any) -> Any:
+        """A path on steps cut in two in which bodies come too near between nodes; None if there are none."""
+        steps = leapt(self.mission, path)
+        return path.cut(path.mesh, steps) if len(steps) else None
+
+    def straight(self, path: Any) -> Any:
+        """The guess on the mesh of a path that is not bent."""
+        return guessed(self.mission, (path.mesh, path.order, path.legs[0].hold), bent=False)
 
     def unleapt(self, attempt: Attempt) -> Attempt:
         """The answer on a mesh on which no two bodies come too near between nodes, if that is found."""
         for _ in range(MOST_CUT):
-            path: Any = attempt.path
-            if not len(steps := leapt(self.mission, path)):
+            if (onto := self.cut_at_leaps(attempt.path)) is None:
                 break
-            onto = path.cut(path.mesh, steps)
             found = self.attempt(onto, carried=True)
             if not found.solved and found.answer.status != "stopped":
                 found = self.attempt(cold(onto), carried=True)
@@ -74,7 +81,7 @@ class TeamClimb(Climb):
     def from_own_answers(self, attempt: Attempt, path: TeamPath) -> Attempt:
         """An answer from paths that every body would take by itself, if all of them have one, bent apart."""
         team, legs = self.mission, []
-        for problem, leg in zip(aimed(team, path.duration), path.legs, strict=True):
+        for problem, leg in zip(aimed(team.members, team.meetings(), path.duration), path.legs, strict=True):
             if problem.free_duration:
                 # All of them must last equally long.
                 problem = replace(problem, duration=path.duration, objective=Effort())
@@ -87,18 +94,16 @@ class TeamClimb(Climb):
         tried = self.from_guess(bent_apart(team, replace(path, legs=tuple(legs))))
         return tried if tried.solved else attempt
 
-    def round_the_other_way(self, attempt: Attempt, path: TeamPath) -> Attempt:
+    def round_the_other_way(self, attempt: Attempt, path: Any) -> Attempt:
         """An answer on which bodies pass on other sides, where they leap through each other on this one."""
         team, answer = self.mission, attempt
-        had: Any = attempt.path
-        if not len(leapt(team, had)):
+        if self.cut_at_leaps(attempt.path) is None:
             return attempt
-        straight = guessed(team, (path.mesh, path.order, path.legs[0].hold), bent=False)
+        straight = self.straight(path)
         for sides in islice(other_sides(team, straight), 1, MOST_SIDES):
             tried = self.from_guess(bent_apart(team, straight, sides))
             answer = self.unleapt(tried) if tried.solved else tried
-            found: Any = answer.path
-            if answer.solved and not len(leapt(team, found)):
+            if answer.solved and self.cut_at_leaps(answer.path) is None:
                 return answer
             if self.interrupt.seen:
                 break
@@ -108,9 +113,9 @@ class TeamClimb(Climb):
         """The answer on a mesh that is finer where two bodies touch, if that is found."""
         for _ in range(SHARPENED):
             path: Any = attempt.path
-            if not attempt.solved or not len(steps := path.touched()):
+            if not attempt.solved or not path.touches:
                 break
-            found = self.attempt(path.cut(path.mesh, steps), carried=True)
+            found = self.attempt(path.cut(path.mesh, path.touched()), carried=True)
             if not found.solved:
                 return found if found.answer.status == "stopped" else attempt
             attempt = found

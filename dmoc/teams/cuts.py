@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +14,10 @@ from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath
 from dmoc.results.between import Cut, cuts
 from dmoc.scene.problem import TransferProblem
-from dmoc.scene.team import Team
 from dmoc.teams.path import TeamPath, between
 
 
-def team_cuts(team: Team, path: TeamPath) -> Iterator[Cut]:
+def team_cuts(team: Any, path: TeamPath) -> Iterator[Cut]:
     """How far each pair breaks what it keeps, at the nodes and between them, and how far it may.
 
     One body, as another one sees it, moves on a path past a zone around the origin: it is judged as by
@@ -39,7 +39,7 @@ def team_cuts(team: Team, path: TeamPath) -> Iterator[Cut]:
             yield replace(cut, name=f"{name} {place}".strip())
 
 
-def leapt(team: Team, path: TeamPath) -> np.ndarray:
+def leapt(team: Any, path: TeamPath) -> np.ndarray:
     """The steps in which two bodies come nearer than is allowed between nodes, or one leaps into a zone."""
     found = [cut.steps for cut in team_cuts(team, path)]
     for problem, leg in zip(team.members, path.legs, strict=True):

@@ -13,7 +13,6 @@ from dmoc.basics.arguments import entries, short
 from dmoc.ends.base import State
 from dmoc.guess.open_ends import end_estimates
 from dmoc.guess.starting import guess_duration, starting_guess
-from dmoc.motion.path import DiscretePath
 from dmoc.parts.detours import CENTRAL, CLEARANCE
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.team import Team
@@ -42,7 +41,7 @@ def guessed(
     parts, duration = _each(team, given), max(map(guess_duration, team.members))
     legs = [
         starting_guess(problem, *numerics, mine, duration)
-        for problem, mine in zip(aimed(team, duration), parts, strict=True)
+        for problem, mine in zip(aimed(team.members, team.meetings(), duration), parts, strict=True)
     ]
     start = TeamPath(tuple(legs), (team.start_time,) * len(legs))
     return bent_apart(team, start, sides) if bent else start
@@ -61,19 +60,21 @@ def _each(team: Team, given: Any) -> tuple:
     return found
 
 
-def aimed(team: Team, duration: float) -> list[TransferProblem]:
+def aimed(
+    members: Sequence[TransferProblem], meetings: Sequence[set[int]], duration: float
+) -> list[TransferProblem]:
     """The transfers of all bodies, each by itself, where they meet nobody; they last about `duration` [s].
 
     Those that are to meet go to a place that one of their goals says; else to the middle of where they would
     be or, where something attracts them, to where the first of them coasts: the middle of two orbits is on
     neither.
     """
-    found = list(team.members)
-    for bodies in map(sorted, team.meetings()):
-        ends = {i: _end(team.members[i], duration) for i in bodies}
+    found = list(members)
+    for bodies in map(sorted, meetings):
+        ends = {i: _end(members[i], duration) for i in bodies}
         given = [state for state, known in ends.values() if known]
         states = given or [state for state, _ in ends.values()]
-        drawn = any(team.members[i].attraction.sources for i in bodies)
+        drawn = any(members[i].attraction.sources for i in bodies)
         first = bool(given) or drawn
         place, velocity = states[0] if first else (np.mean([place for place, _ in states], axis=0), None)
         for i, (_, known) in ends.items():
@@ -91,30 +92,32 @@ def _end(problem: TransferProblem, duration: float) -> tuple[tuple[np.ndarray, n
     return (np.where(np.isnan(place), begin, place), velocity), known
 
 
-def bent_apart(team: Team, path: TeamPath, sides: Sequence[int] = ()) -> TeamPath:
+def bent_apart(team: Any, path: Any, sides: Sequence[int] = ()) -> Any:
     """A path on which bodies that come nearer to each other than they may are bent to their sides."""
     if team.dimension == 1:
         return path
     for _ in range(PASSES):
-        bends = [np.zeros_like(leg.place) for leg in path.legs]
+        ways = path.ways
+        bends = [np.zeros_like(way) for way in ways]
         near = list(too_near(team, path))
         for place, a, b, distance in near:
             side = sides[place] if place < len(sides) else 0
-            bend = _bend(path.legs[a], path.legs[b], distance, side)
+            bend = _bend(ways[b] - ways[a], path.fractions, distance, side)
             bends[a] -= 0.5 * bend
             bends[b] += 0.5 * bend
-        path = replace(path, legs=tuple(leg.moved(bend) for leg, bend in zip(path.legs, bends, strict=True)))
+        path = path.moved(bends)
         if not near:
             break
     return path
 
 
-def too_near(team: Team, path: TeamPath) -> Iterator[tuple[int, int, int, float]]:
+def too_near(team: Any, path: Any) -> Iterator[tuple[int, int, int, float]]:
     """Pairs that come nearer than they may: which of all pairs, the two bodies, and what they are to keep."""
+    ways = path.ways
     for i, (part, a, b) in enumerate(team.pairs()):
         if not (distance := part.distance_kept):
             continue
-        if _nearest(path.legs[b].place - path.legs[a].place) < distance:
+        if _nearest(ways[b] - ways[a]) < distance:
             yield i, a, b, distance
 
 
@@ -127,7 +130,7 @@ def _nearest(apart: np.ndarray) -> float:
     return float(np.linalg.norm(both, axis=1).min())
 
 
-def other_sides(team: Team, path: TeamPath) -> Iterator[tuple[int, ...]]:
+def other_sides(team: Any, path: Any) -> Iterator[tuple[int, ...]]:
     """Which pairs pass on which side, all ways in turn: those that come near; the usual way is the first."""
     near = [i for i, *_ in too_near(team, path)]
     for signs in product((1, -1), repeat=len(near)):
@@ -137,12 +140,11 @@ def other_sides(team: Team, path: TeamPath) -> Iterator[tuple[int, ...]]:
         yield tuple(sides)
 
 
-def _bend(first: DiscretePath, second: DiscretePath, distance: float, side: int) -> np.ndarray:
+def _bend(apart: np.ndarray, fractions: np.ndarray, distance: float, side: int) -> np.ndarray:
     """How the way of one body as the other one sees it is bent past it, zero at both ends [m].
 
     It passes on the side (1 left, -1 right) or, if that is 0, on the nearer one: on the left if none is.
     """
-    apart, fractions = second.place - first.place, first.fractions
     node = int(np.argmin(np.linalg.norm(apart[1:-1], axis=1))) + 1
     along = apart[node + 1] - apart[node - 1]
     if not np.linalg.norm(along):

@@ -33,19 +33,21 @@ def team_optima(
         if tried.answer.status == "stopped":
             break
         if tried.solved:
-            _put(found, Optimum(tried.level.objective, tried.path, (name,)))
+            put(found, Optimum(tried.level.objective, tried.path, (name,)))
     return sorted(found, key=lambda optimum: team.objective.sense * optimum.objective)
 
 
-def _put(found: list[Optimum], new: Optimum) -> None:
+def put(found: list[Optimum], new: Optimum) -> None:
     """Add an optimum, or its guess to one that is the same."""
     for i, old in enumerate(found):
         near = abs(new.objective - old.objective) <= SAME_OBJECTIVE * abs(old.objective)
+        alike = len(new.path.legs) == len(old.path.legs)
         gaps = [
             np.abs(one.place - other.place).max() / (one.diagonal or 1.0)
-            for one, other in zip(new.path.legs, old.path.legs, strict=True)
+            for one, other in zip(new.path.legs, old.path.legs, strict=alike)
+            if len(one.place) == len(other.place)
         ]
-        if near and max(gaps) < SAME_PATH:
+        if near and alike and max(gaps, default=0.0) < SAME_PATH:
             found[i] = Optimum(old.objective, old.path, old.starts + new.starts)
             return
     found.append(new)

@@ -57,6 +57,20 @@ class TeamPath(MissionPath):
     def order(self) -> int:
         return self.legs[0].order
 
+    @property
+    def ways(self) -> list[np.ndarray]:
+        """The places of each body at the nodes [m]."""
+        return [leg.place for leg in self.legs]
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Fractions of the duration at the nodes."""
+        return self.legs[0].fractions
+
+    def moved(self, bends: Sequence[np.ndarray]) -> TeamPath:
+        """The same with the places of all bodies moved by bends, one row a node [m]."""
+        return replace(self, legs=tuple(leg.moved(bend) for leg, bend in zip(self.legs, bends, strict=True)))
+
     def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> TeamPath:
         """The same on another mesh and order; there is one for all bodies."""
         (mesh, order), *_ = meshes
@@ -81,17 +95,27 @@ class TeamPath(MissionPath):
         middles = 0.5 * (mesh[1:] + mesh[:-1])[steps]
         return self.onto([(np.unique(np.concatenate([self.mesh, middles])), self.order)])
 
-    def touched(self) -> np.ndarray:
+    @property
+    def pushes(self) -> np.ndarray:
+        """The largest multiplier at each node of what two bodies keep there, in the unit of the objective."""
+        each = [np.abs(values).max(axis=1) * self.weights for values in self.densities.values()]
+        return np.max(each, axis=0) if each else np.zeros(len(self.fractions))
+
+    def touched(self, largest: float = 0.0) -> np.ndarray:
         """The steps at whose nodes two bodies are as near as they may be: where rows push them apart.
 
         The time at which they touch is none of the nodes', which costs about the square of the steps there.
+        Pushes are compared with the largest of them, or with one that is larger still.
         """
-        pushes = [np.abs(values).max(axis=1) * self.weights for values in self.densities.values()]
-        if not pushes or not (largest := max(push.max() for push in pushes)):
-            return np.zeros(0, int)
-        nodes = np.flatnonzero(np.max(pushes, axis=0) > PUSHES * largest)
+        pushes = self.pushes
+        nodes = np.flatnonzero(pushes > PUSHES * max(largest, pushes.max()))
         degree, last = scheme(self.order).degree, len(self.mesh) - 2
         return np.unique(np.clip([nodes // degree, (nodes - 1) // degree], 0, last))
+
+    @property
+    def touches(self) -> bool:
+        """Whether two bodies are as near as they may be somewhere."""
+        return len(self.touched()) > 0
 
     def stretched(self, mission: Any, factor: float) -> TeamPath:
         """The same but so many times as long, within the bounds of a free duration."""

@@ -13,10 +13,14 @@ from dmoc.chains.program import MissionProgram
 from dmoc.chains.within import Placed, leg_program
 from dmoc.ipopt.run import Answer
 from dmoc.nlp.assembly import Block
+from dmoc.nlp.layout import Group
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem
 from dmoc.teams.between import BetweenBodies
 from dmoc.teams.path import TeamPath
+
+# A scaled multiplier below this is what the barrier leaves of none [-].
+FELT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -99,10 +103,22 @@ class TeamProgram(MissionProgram):
             legs.append(program.path(program.problem, mine))
         found = TeamPath(tuple(legs), (self.mission.start_time,) * len(legs))
         forces, densities = {}, {}
+        pushes = felt(self.rows.groups, answer.lam_g[self.first_row :])
         for group in self.rows.groups:
-            values = group.of(answer.lam_g[self.first_row :]) * group.scales * self.cost
+            values = group.of(pushes) * group.scales * self.cost
             if group.kind == "node":
                 densities[group.name] = values / found.weights[:, None]
             else:
                 forces[group.name] = values.ravel()
         return replace(found, forces=forces, densities=densities)
+
+
+def felt(groups: Sequence[Group], multipliers: np.ndarray) -> np.ndarray:
+    """Scaled multipliers of rows between bodies; 0 at nodes if no two bodies push each other at any of them."""
+    at_nodes = [np.arange(group.start, group.stop) for group in groups if group.kind == "node"]
+    places = np.concatenate([np.empty(0, int), *at_nodes])
+    if np.abs(multipliers[places]).max(initial=0.0) >= FELT:
+        return multipliers
+    found = multipliers.copy()
+    found[places] = 0.0
+    return found

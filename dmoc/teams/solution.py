@@ -80,6 +80,16 @@ class TeamSolution(Outcome):
         return TeamPath(legs, begins, forces=self.forces, densities=self.densities)
 
     @property
+    def parts(self) -> tuple[Solution, ...]:
+        """The bodies, each like the solution of a transfer."""
+        return self.members
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """What the parts are called."""
+        return self.names
+
+    @property
     def order(self) -> int:
         return self.members[0].order
 

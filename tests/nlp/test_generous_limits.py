@@ -15,6 +15,7 @@ from dmoc import (
     Attitude,
     BallForce,
     BoxForce,
+    Fuel,
     Leg,
     Mission,
     State,
@@ -28,6 +29,7 @@ from dmoc import (
     verify,
 )
 from dmoc.scene.problem_file import load_problem
+from dmoc.solver import mended
 
 LONGEST = 1000.0
 REST = State((0, 0), (0, 0)), State((2, 0), (0, 0))
@@ -89,6 +91,22 @@ def test_a_limit_that_a_body_needs_to_hover_is_not_far_above():
     hover = TransferProblem(1.0, *REST, 400.0, [UniformGravity((0, -9.81))], actuator=BallForce(20.0))
     found = solve(hover)
     assert verify(found).ok and found.iterations < 20
+
+
+def least_fuel(limit):
+    """Two impulses of m L / T are the least; the rounding of |F|, a part of the limit, cost a third more."""
+    return TransferProblem(1.0, *REST, 4.0, actuator=BallForce(limit), objective=Fuel())
+
+
+def test_fuel_does_not_pay_for_a_thrust_that_is_never_used():
+    found = solve(least_fuel(1e4))
+    assert verify(found).ok and found.objective == pytest.approx(1.0, rel=5e-3)
+
+
+def test_the_ledger_tells_what_is_paid_for_the_rounding_alone(monkeypatch):
+    monkeypatch.setattr(mended, "MOST_SHARPER", 0)
+    wide = solve(least_fuel(1e4))
+    assert wide.objective > 1.2 and not verify(wide)["ledger"].ok
 
 
 def test_half_of_the_best_duration_is_no_optimum_whatever_the_limit():

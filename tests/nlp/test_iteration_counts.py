@@ -51,6 +51,7 @@ RECORD = {
 MISSIONS = {
     "bielliptic": 49,
     "cw_impulses": 23,
+    "delivery": 43,
     "delta_iii": 24,
     "earth_mars_2028": 10,
     "gates": 7,

@@ -7,7 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmoc import BallForce, CircularOrbit, Engine, Fuel, PointGravity, State, TransferProblem, solve, verify
+from dmoc import (
+    BallForce,
+    CircularOrbit,
+    Engine,
+    Fuel,
+    Orbit,
+    PointGravity,
+    State,
+    TransferProblem,
+    solve,
+    verify,
+)
 from dmoc.cli.app import main
 from dmoc.scene.problem_file import load_problem
 
@@ -80,6 +91,20 @@ def test_an_orbit_as_the_goal_is_tried_too():
     spent = -1.5 * math.log(solution.final_mass)
     assert 0.3938 < spent < 1.03 * 0.3938
     assert verify(solution).ok
+
+
+def test_a_tolerance_to_an_orbit_as_a_whole_ends_at_the_cheap_optimum():
+    """From the guess alone it costs 0.0937, with every check green."""
+    problem = TransferProblem(
+        1.0,
+        State((-0.4008871772869974, -0.9161274316856054), (0.9452918339789206, -0.41364919543890216)),
+        Orbit(1.0, a=1.1099314775511324, e=0.05168360699499817, center=(0.0, 0.0)),
+        (5.330134846430954, 13.48064081498765),
+        effects=[PointGravity(1.0)],
+    )
+    solution = solve(problem, tol=1e-5).raise_for_status()
+    assert verify(solution).ok
+    assert solution.objective == pytest.approx(1.36406e-5, rel=1e-4)
 
 
 @pytest.mark.slow

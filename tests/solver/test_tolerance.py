@@ -64,6 +64,13 @@ def test_one_mesh_is_enough_where_nothing_switches(name, tol):
 
 
 @pytest.mark.filterwarnings("error")
+def test_held_forces_follow_the_motion_around_an_attractor_at_order_4():
+    """At order 2 the motion, not the held force, needs ten times the steps."""
+    found = asked("orbit_raise", 1e-4, hold=True)
+    assert found.order == 4 and verify(found).ok
+    assert found.steps < 0.5 * asked("orbit_raise", 1e-4, hold=True, order=2).steps
+
+
 def test_a_tolerance_may_begin_with_two_held_steps():
     found = asked("bang_bang", 1e-2, steps=2, hold=True)
     assert verify(found).ok and found.objective == pytest.approx(2.0, rel=1e-2)

@@ -261,9 +261,13 @@ def test_two_burns_to_a_tolerance():
     assert solution.final_mass == pytest.approx(0.766189, rel=1e-5)
 
 
-def test_a_weak_upper_stage():
+@pytest.mark.parametrize("numerics", [{}, pytest.param({"tol": 1e-4}, marks=pytest.mark.slow)])
+def test_a_weak_upper_stage(numerics):
     """Meshes from 50 steps of order 6 to 2,000 of order 4 agree on 1,565.9 kg."""
-    assert certified(weak_upper_stage()).objective == pytest.approx(1565.9, rel=1e-4)
+    solution = certified(weak_upper_stage(), **numerics)
+    assert solution.objective == pytest.approx(1565.9, rel=1e-4)
+    # To a tolerance legs with free ends are found, on a hundredth of the steps that would be cut at switches.
+    assert solution.steps < 150
 
 
 @pytest.mark.parametrize("numerics", [{}, pytest.param({"tol": 1e-4}, marks=pytest.mark.slow)])

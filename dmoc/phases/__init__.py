@@ -1,0 +1,1 @@
+"""Teams whose bodies have several legs: one clock, cut wherever any of them has a joint."""

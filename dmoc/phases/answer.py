@@ -1,0 +1,105 @@
+"""The answer of an attempt at a team of missions as a PhasedSolution."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dmoc.basics.digits import lasting
+from dmoc.ipopt.run import STATUSES
+from dmoc.missions.answer import costs_of, mission_solution, worst_rows
+from dmoc.phases.cuts import phased_cuts
+from dmoc.phases.path import PhasedPath
+from dmoc.phases.solution import PhasedSolution
+from dmoc.phases.timetable import Timetable
+from dmoc.results.facts import Error, Provenance
+from dmoc.results.solution import NOT_MET
+from dmoc.rungs.rung import cut_short
+from dmoc.scene.clock import cautions_of, dates_of
+from dmoc.teams.answer import in_distances, run_through
+
+
+def answered(
+    climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
+) -> PhasedSolution:
+    """The answer of an attempt as a PhasedSolution; that of the last mesh solved if the time was over."""
+    if attempt.answer.status == "stopped" and climb.interrupt.late:
+        attempt = climb.held or attempt
+        found: Any = _answered(climb, attempt, error, True, tol)
+        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
+    return _answered(climb, attempt, error, met, tol)
+
+
+def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> PhasedSolution:
+    plan, program, answer = attempt.program.mission, attempt.program, attempt.answer
+    team, path, status, success = plan.team, attempt.path, answer.status, attempt.solved
+    message = "a local optimum" if success else climb.reason or STATUSES[status].advice
+    if success and (broken := run_through(phased_cuts(plan, path))):
+        status, success, message = "infeasible", False, broken
+    if success and not met:
+        status, success = NOT_MET, False
+        reached = "unknown" if error is None else f"{error.largest:.1e}"
+        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    about = Provenance(
+        team.name,
+        team.parameters,
+        path.begins[0],
+        team.objective.unit_with(team.actuator),
+        options=climb.options,
+        **dates_of(team),
+    )
+    of_legs, of_bodies = costs_of(program, answer.x), program.costs(answer.x)
+    members = tuple(
+        mission_solution(
+            mission,
+            path.of(i),
+            of_legs[i * plan.count : (i + 1) * plan.count],
+            mission.objective.sense * float(of_bodies[i]),
+            answer.status,
+            [attempt.level],
+        )
+        for i, mission in enumerate(plan.cut)
+    )
+    between = {name: values for name, values in path.forces.items() if name not in _of_joints(program)}
+    steps = ", ".join(str(len(mesh) - 1) for mesh in path.mesh)
+    return PhasedSolution(
+        team,
+        members,
+        team.names,
+        between,
+        path.densities,
+        attempt.level.objective,
+        success,
+        status,
+        message,
+        tuple(climb.levels),
+        worst=() if success else in_distances(plan, worst_rows(program, answer, path)),
+        warnings=_warnings(plan, path) if success else (),
+        tolerance=tol,
+        error=error,
+        reason=f"{len(members)} bodies in {plan.count} phases of {steps} steps{climb.told}",
+        provenance=about,
+        joints=plan.order,
+    )
+
+
+def _of_joints(program: Any) -> set[str]:
+    """The names of the groups of rows that belong to joints of bodies."""
+    return {group.name for group in program.rows.groups if group.start < program.joint_rows}
+
+
+def _warnings(plan: Timetable, path: PhasedPath) -> tuple[str, ...]:
+    """Legs that end on a limit of their duration as stated, and phases that are as short as may be."""
+    found = []
+    for name, mission, mine in zip(plan.names, plan.missions, plan.leg_of, strict=True):
+        for i, (leg, word) in enumerate(zip(mission.stretches, mission.leg_names, strict=True)):
+            lasts = float(path.durations[mine == i].sum())
+            bound = leg.limit_of_duration(lasts)
+            if bound is not None:
+                other = "shorter" if bound == "shortest" else "longer"
+                ends = f"{word} of {name} ends on its {bound} duration of {lasting(lasts, 6)}"
+                found.append(f"{ends}: a {other} one may cost less")
+    if short := plan.short(path.durations):
+        found.append(
+            f"joints of two bodies end at one time in phase {short[0] + 1}: another order of them may cost less"
+        )
+    return (*found, *cautions_of(plan.team))
