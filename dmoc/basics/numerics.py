@@ -179,10 +179,10 @@ def in_plain_memory(
         if name in given and function.nnz_in(i)
     }
     for i, values in inputs.items():
-        buffer.set_arg(i, memoryview(values))
+        buffer.set_arg(i, memoryview(values))  # type: ignore[arg-type]
     for i, values in enumerate(outputs.values()):
         if len(values):
-            buffer.set_res(i, memoryview(values))
+            buffer.set_res(i, memoryview(values))  # type: ignore[arg-type]
     try:
         before = buffer.stats()
     except RuntimeError:  # It has not run yet.

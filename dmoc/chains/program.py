@@ -14,7 +14,7 @@ import numpy as np
 from dmoc.chains.again import assembled_again, kernel_again
 from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
 from dmoc.chains.path import MissionPath, joint_cost
-from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows
+from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows, with_rows
 from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.ipopt.options import NEAR, rounding, settings_for
 from dmoc.ipopt.run import Answer, Watch, make_solver, run
@@ -22,7 +22,6 @@ from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
 from dmoc.nlp.layout import LEG_START, Layout
 from dmoc.nlp.transcription import MOST_HELD_NODES
 from dmoc.nlp.units import Units, units_of
-from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
 
@@ -80,10 +79,10 @@ class MissionProgram:
             writer = JointWriter(mission, joint, legs, own[joint.name], given, rounding)
             writer.write()
             columns += layout.size
-            rows = _add(rows, joint.name, writer.rows, beside.units, bounds)
+            rows = with_rows(rows, joint.name, writer.rows, beside.units, bounds)
             writers.append(writer)
         whole, places, expressions = whole_rows(mission, legs, row_to_drop(mission, legs, path), given)
-        rows = _add(
+        rows = with_rows(
             rows, WHOLE, whole, max((leg.program.units for leg in legs), key=attrgetter("time")), bounds
         )
         blocks += [
@@ -97,7 +96,7 @@ class MissionProgram:
             blocks.append(Block(made, places[:, None], first_row + rows[WHOLE].indices, np.empty((0, 1))))
         for placed, plan, name in zip(legs, mission.plan, mission.leg_names, strict=True):
             smooth, controls, weights = polynomial_rows(placed, plan)
-            rows = _add(rows, group := f"controls of {name}", smooth, placed.program.units, bounds)
+            rows = with_rows(rows, group := f"controls of {name}", smooth, placed.program.units, bounds)
             if smooth:
                 blocks.append(polynomial_block(controls, weights, first_row + rows[group].indices.T))
         lower, upper = (np.concatenate([np.empty(0), *side]) for side in zip(*bounds, strict=True))
@@ -294,17 +293,3 @@ class MissionProgram:
 def unit_of_cost(mission: Mission, path: MissionPath, sizes: Sequence[Units]) -> float:
     """About what a path costs, by the units of its legs and what its joints cost."""
     return max(joint_cost(mission, path), *[unit.cost for unit in sizes if unit.cost != 1.0], 0.0) or 1.0
-
-
-def _add(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:
-    """The layout of joints with one more group, whose scaled bounds are put behind the others."""
-    if not new:
-        return rows
-    scale = np.array([[1 / units.of(row.unit) for row in new]])
-    bounds.append(
-        (
-            np.array([row.lower for row in new]) * scale.ravel(),
-            np.array([row.upper for row in new]) * scale.ravel(),
-        )
-    )
-    return rows.add(name, "end", [row.name for row in new], 1, scale, None, [row.unit for row in new])

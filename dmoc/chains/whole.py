@@ -14,6 +14,7 @@ from dmoc.chains.path import MissionPath
 from dmoc.chains.within import Placed
 from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.layout import LEG_START, Layout
+from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
 
@@ -86,3 +87,17 @@ def whole_rows(
     if not rows:
         return [], np.zeros(0, int), ca.SX(0, 1)
     return rows, np.concatenate([*map(np.array, pool)]), ca.vertcat(*pool.values())
+
+
+def with_rows(rows: Layout, name: str, new: Sequence[Row], units: Units, bounds: list) -> Layout:
+    """The layout of joints with one more group, whose scaled bounds are put behind the others."""
+    if not new:
+        return rows
+    scale = np.array([[1 / units.of(row.unit) for row in new]])
+    bounds.append(
+        (
+            np.array([row.lower for row in new]) * scale.ravel(),
+            np.array([row.upper for row in new]) * scale.ravel(),
+        )
+    )
+    return rows.add(name, "end", [row.name for row in new], 1, scale, None, [row.unit for row in new])

@@ -1,4 +1,4 @@
-"""Coasts: where a body gets without thrust, and between two impulses; what it takes to hold it or to turn it."""
+"""Coasts: where a body gets without thrust, and between two impulses; what holds it and what turns it."""
 
 from __future__ import annotations
 
