@@ -5,7 +5,9 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -177,6 +179,20 @@ def _is_settled(iterations: dict[str, list[float]], rounding: float) -> bool:
     return bool(row <= rounding and max(slope, barrier) <= SETTLED)
 
 
+# When the solve began whose time limits count together [s of the monotonic clock].
+_begun: ContextVar[float | None] = ContextVar("begun", default=None)
+
+
+@contextmanager
+def one_clock() -> Iterator[None]:
+    """Within it, as in one solve by several ways, all time limits count from its begin."""
+    token = _begun.set(_begun.get() or time.monotonic())
+    try:
+        yield
+    finally:
+        _begun.reset(token)
+
+
 class Interrupt:
     """Ctrl-C as a flag while a solve runs: CasADi would swallow the exception, and the iterate be lost.
 
@@ -184,7 +200,7 @@ class Interrupt:
     """
 
     def __init__(self, seconds: float | None = None) -> None:
-        self.seconds, self._begun = seconds, time.monotonic()
+        self.seconds, self._begun = seconds, _begun.get() or time.monotonic()
         self._pressed = False
         self._previous: Any = None
 

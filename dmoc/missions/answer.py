@@ -30,7 +30,8 @@ def answered(
     if attempt.answer.status == "stopped" and climb.interrupt.late:
         # Where arcs were added since, the last mission that was solved had other legs.
         held = climb.held
-        attempt = held if held and len(held.path.legs) == len(climb.mission.stretches) else attempt
+        same = held and len(held.path.legs) == len(climb.mission.stretches)
+        attempt = (held if same else attempt).out_of_time()
         found = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
     return _answered(climb, attempt, error, met, tol)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,3 +51,7 @@ class Attempt:
     def largest_error(self) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
         return max(float(each.sum()) for each in self.errors)
+
+    def out_of_time(self) -> Attempt:
+        """The attempt when the time is over: what did not get there has failed, nobody interrupted it."""
+        return self if self.solved else replace(self, answer=replace(self.answer, status="failed"))

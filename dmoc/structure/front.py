@@ -11,6 +11,7 @@ from dmoc.basics.files import as_path
 from dmoc.basics.memory import unchanged
 from dmoc.checks import verification
 from dmoc.checks.verification import Report
+from dmoc.ipopt.run import one_clock
 from dmoc.nlp.solving import Progress
 from dmoc.results import solution as transfers
 from dmoc.results.netcdf import format_of
@@ -97,6 +98,7 @@ def solve(
 
 
 @unchanged()
+@one_clock()
 def solve(
     problem: TransferProblem | Mission | Team,
     order: int | None = None,

@@ -19,6 +19,7 @@ from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
+from dmoc.rungs.rung import cut_short
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen, without_waiting
@@ -98,13 +99,13 @@ def solve_by_structure(
     return None if otherwise is None else _better(found, otherwise())
 
 
-def _is_dear(found: MissionSolution, coarse: Solution, part: float = WORSE) -> bool:
+def _is_dear(found: Solution | MissionSolution, coarse: Solution, part: float = WORSE) -> bool:
     """Whether an answer costs so much more than the coarse one that another optimum may be better."""
     sense = coarse.require_problem().objective.sense
     return found.optimal and sense * (found.objective - coarse.objective) > part * abs(coarse.objective)
 
 
-def _better(found: MissionSolution, other: Solution) -> MissionSolution | Solution:
+def _better(found: Solution | MissionSolution, other: Solution) -> MissionSolution | Solution:
     """The one of two answers to stay with: the other one where that is an optimum and costs less."""
     sense = found.require_problem().objective.sense
     return other if other.optimal and sense * (found.objective - other.objective) > 0 else found
@@ -116,8 +117,11 @@ def _by_arcs(
     tol: float | None,
     more: dict[str, Any],
     most: int = MOST_ITERATIONS,
-) -> MissionSolution | None:
-    """The answer as a mission of the arcs of a coarse one; an attempt ends after `most` iterations."""
+) -> Solution | MissionSolution | None:
+    """The answer as a mission of the arcs of a coarse one; an attempt ends after `most` iterations.
+
+    If the time was over before there was one, the coarse answer.
+    """
     arcs = arcs_of(coarse)
     if most > MOST_ITERATIONS:
         arcs = surely_seen(arcs, coarse)
@@ -132,6 +136,8 @@ def _by_arcs(
         climb.levels.extend(coarse.ladder)
         with climb.interrupt:
             found = _improved(climb, problem, these, (coarse,), tol, most)
+        if climb.interrupt.late and not (found and found.optimal):
+            return cut_short(coarse, climb.interrupt.seconds, True)
         if found is None or _is_dear(found, coarse, dearer):
             continue
         if found.status in ENDED:

@@ -24,7 +24,7 @@ def answered(
 ) -> TeamSolution:
     """The answer of an attempt as a TeamSolution; that of the last mesh solved if the time was over."""
     if attempt.answer.status == "stopped" and climb.interrupt.late:
-        attempt = climb.held or attempt
+        attempt = (climb.held or attempt).out_of_time()
         found: Any = _answered(climb, attempt, error, True, tol)
         return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
     return _answered(climb, attempt, error, met, tol)

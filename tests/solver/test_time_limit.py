@@ -67,6 +67,29 @@ def test_the_exit_code_tells(limit, code, capsys):
     assert json.loads(capsys.readouterr().out)["success"] is False
 
 
+@pytest.mark.parametrize("problem", ["gates", "three_robots", "delivery"])
+def test_a_mission_or_team_without_an_answer_in_time_has_failed_and_was_not_interrupted(problem):
+    solution = solve(load_problem(problem).make(), time_limit=0.03)
+    assert solution.status == "failed" and "before any mesh was solved: give more time" in solution.message
+
+
+def test_without_legs_in_time_the_coarse_answer_is_kept():
+    problem = load_problem("two_body_fuel").make()
+    coarse = solve(problem, order=4, steps=30)
+    cut = solve(problem, structure=True, time_limit=0.01 * (coarse.iterations + 30))
+    assert cut.status == "time limit" and cut.order == 4 and not hasattr(cut, "legs")
+    assert cut.objective == pytest.approx(coarse.objective, rel=1e-2)
+
+
+def test_the_limits_of_one_solve_count_together():
+    with ipopt.one_clock():
+        first = ipopt.Interrupt(0.05)
+        for _ in range(10):
+            first.seen  # noqa: B018 - a look at the clock
+        assert ipopt.Interrupt(0.05).late and not ipopt.Interrupt(5.0).late
+    assert not ipopt.Interrupt(0.05).late
+
+
 @pytest.mark.parametrize("bad", ["0", "-1", "nan"])
 def test_a_limit_without_meaning_is_refused(bad, capsys):
     with pytest.raises(SystemExit) as done:
