@@ -23,6 +23,8 @@ from dmoc.scene.problem import TransferProblem
 # A spiral to an open orbit is made this many times: the place where it arrives is put onto that orbit and is
 # the aim of the next one.
 PASSES = 3
+# What takes less than this part of a velocity change once the orbit has drifted [-] is not needed.
+DRIFTED = 0.9
 # An orbit above this eccentricity [-] is not changed evenly into another: its body is fast and slow by turns.
 MOST_ECCENTRIC = 0.9
 # An orbit below this eccentricity [-] that changes evenly is sure to be near the best path, so that blended
@@ -82,6 +84,21 @@ def spiral_between(problem: TransferProblem, duration: float, states: Any) -> Sp
     place = states[0 if from_goal else 1][0]
     gap = _distance(_end_of(spiral, problem.dimension)[0], place)
     return spiral if gap < 0.05 * _distance(place, spiral.center[: problem.dimension]) else None
+
+
+def spiral_change(problem: TransferProblem, duration: float, spiral: Spiral) -> float:
+    """The velocity change of a spiral to an open place [m/s].
+
+    What turns the plane of a coast, as the oblateness of a planet does, needs no thrust where the goal lets it:
+    it counts from the orbit to which the start has drifted.
+    """
+    if problem.goal.anchored:
+        return spiral.velocity_change
+    drifted = _drift(problem, 0.0, duration, end_estimates(problem, duration)[0])
+    goal = problem.goal.estimate(problem.start_time + duration, drifted)
+    change = velocity_change_between(problem, (drifted, goal))
+    # Elsewhere both are the same but for rounding.
+    return change if change < DRIFTED * spiral.velocity_change else spiral.velocity_change
 
 
 def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:

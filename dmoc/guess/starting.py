@@ -13,7 +13,7 @@ from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import VERY_MANY_TURNS, controls_for
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.flyby import least_effort_past
-from dmoc.guess.open_ends import end_estimates, spiral_between
+from dmoc.guess.open_ends import end_estimates, spiral_between, spiral_change
 from dmoc.guess.past_zones import off_centres
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -219,7 +219,9 @@ def guess_duration(problem: TransferProblem) -> float:
         return shortest_flyable(problem, partial(_ends_in_pairs, problem), acceleration)
     spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
     if spiral is not None:
-        needed = max(2 * np.sqrt(spiral.climb / acceleration), spiral.velocity_change / acceleration)
+        needed = max(
+            2 * np.sqrt(spiral.climb / acceleration), spiral_change(problem, middle, spiral) / acceleration
+        )
     else:
         needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
     return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle

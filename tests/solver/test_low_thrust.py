@@ -2,11 +2,13 @@
 
 import math
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from dmoc import solve, verify
+from dmoc import Time, solve, verify
+from dmoc.guess.starting import guess_duration
 
 CASE = runpy.run_path(str(Path(__file__).parents[1] / "cases" / "leo_week.py"))
 EXHAUST = 1600.0 * 9.80665
@@ -48,3 +50,11 @@ def test_least_fuel_of_a_week():
     assert verify(solution).ok
     assert sum(level.iterations for level in solution.ladder) <= 60
     assert 500.0 - solution.final_mass == pytest.approx(7.9748, abs=5e-4)
+
+
+def test_a_plane_that_a_coast_turns_by_itself_takes_no_time():
+    """A week around the oblate Earth turns the node by 29 degrees, 3.6 km/s, to an orbit of any node."""
+    week = CASE["problem"]()
+    problem = replace(week, duration=(3.5 * 86400, 14 * 86400), objective=Time())
+    # The difference of the speeds, 251.8 m/s, takes 5.8 days at 0.25 N.
+    assert guess_duration(problem) == pytest.approx(1.2 * 251.8 / 0.25 * 500.0, rel=0.1)
