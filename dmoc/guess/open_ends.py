@@ -23,7 +23,7 @@ from dmoc.scene.problem import TransferProblem
 # A spiral to an open orbit is made this many times: the place where it arrives is put onto that orbit and is
 # the aim of the next one.
 PASSES = 3
-# What takes less than this part of a velocity change once the orbit has drifted [-] is not needed.
+# Less than this part of a velocity change once the orbit has drifted [-]: the rest is not needed.
 DRIFTED = 0.9
 # An orbit above this eccentricity [-] is not changed evenly into another: its body is fast and slow by turns.
 MOST_ECCENTRIC = 0.9
@@ -92,13 +92,11 @@ def spiral_change(problem: TransferProblem, duration: float, spiral: Spiral) -> 
     What turns the plane of a coast, as the oblateness of a planet does, needs no thrust where the goal lets it:
     it counts from the orbit to which the start has drifted.
     """
-    if problem.goal.anchored:
-        return spiral.velocity_change
+    begin, whole = problem.start_time, spiral.velocity_change
     drifted = _drift(problem, 0.0, duration, end_estimates(problem, duration)[0])
-    goal = problem.goal.estimate(problem.start_time + duration, drifted)
-    change = velocity_change_between(problem, (drifted, goal))
+    change = velocity_change_between(problem, (drifted, problem.goal.estimate(begin + duration, drifted)))
     # Elsewhere both are the same but for rounding.
-    return change if change < DRIFTED * spiral.velocity_change else spiral.velocity_change
+    return whole if problem.goal.anchored or not change < DRIFTED * whole else change
 
 
 def windings_between(problem: TransferProblem, duration: float, states: Any, more: int | None = None) -> list:

@@ -219,9 +219,8 @@ def guess_duration(problem: TransferProblem) -> float:
         return shortest_flyable(problem, partial(_ends_in_pairs, problem), acceleration)
     spiral = spiral_between(problem, middle, ((q0, v0), (q1, v1)))
     if spiral is not None:
-        needed = max(
-            2 * np.sqrt(spiral.climb / acceleration), spiral_change(problem, middle, spiral) / acceleration
-        )
+        change = spiral_change(problem, middle, spiral)
+        needed = max(2 * np.sqrt(spiral.climb / acceleration), change / acceleration)
     else:
         needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
     return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
