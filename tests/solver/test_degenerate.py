@@ -165,7 +165,8 @@ def test_to_coast_is_found_soon_where_it_may_end_anywhere(start, duration):
 
 def test_no_thrust_costs_no_more_than_its_rounding():
     still = rest_to_rest((0.0, 0.0), 4.0, actuator=BallForce(1.0), objective=Fuel())
-    assert certified(still).objective == pytest.approx(4e-5, rel=1e-3)
+    # |F| is rounded over 1e-9 of its limit, once that of the first answer turned out to be all that it costs.
+    assert certified(still).objective == pytest.approx(4e-9, rel=1e-3)
 
 
 # too much freedom
