@@ -281,11 +281,8 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:
-    names = list(known)
-    # Beside a name that is nearly the same a distant one only confuses.
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.8)
-    near = near or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    return f" (did you mean {' or '.join(near)}?)" if near else ""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 def _short(value: Any) -> str:

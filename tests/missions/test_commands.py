@@ -142,7 +142,7 @@ def test_a_time_limit_ends_a_mission_with_the_last_mesh_that_was_solved(folder, 
     late["after"] = 0
     solved.clear()
     code, said = run(capsys, "solve", "hohmann.py", "--time-limit", "60", "--quiet")
-    assert "Solved" not in said.out and "Not solved: stopped" in said.out
+    assert "Solved" not in said.out and "Not solved: failed" in said.out
 
 
 @pytest.mark.parametrize("more", [["--hold"], ["--compiled"], ["--guess", "known.nc"], ["--tol", "1e-6"]])
