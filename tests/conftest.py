@@ -6,7 +6,7 @@ import pytest
 
 # Names of tests, one a line, that take long although their neighbours with other parameters do not.
 LONG = Path(__file__).with_name("long_tests.txt")
-# Of a test with more cases than this every fifth one is run, the others are among the slow tests, but for those
+# Of a test with more cases than this every tenth one is run, the others are among the slow tests, but for those
 # that read files: continuous integration has twelve minutes on two cores.
 MOST_CASES = 4
 WHOLE = ("test_house.py", "test_layers.py", "test_docs.py", "test_pages.py", "test_site.py", "test_problems.py")
@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(config, items):
             cases[item.path, item.originalname].append(item)
     for group in cases.values():
         for i, item in enumerate(group if len(group) > MOST_CASES else ()):
-            if i % 5:
+            if i % 10:
                 item.add_marker(pytest.mark.slow)
     whole = not config.option.keyword and config.args == [str(root / "tests")]
     if whole and (gone := names - found.keys()):

@@ -594,7 +594,7 @@ LEFT_OUT = {("solve", "progress"): lambda value: callable(value)}
 def test_functions_and_odd_values(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     function, good = CALLS[name]
-    if name in ("convert", "verify", "save_figure", "symmetries", "worth", "predict", "disperse"):
+    if name in ("convert", "verify", "save_figure", "symmetries", "worth", "predict", "disperse", "foresee"):
         good = good | {"solution": solve(HERE, steps=4)}
     for argument in good:
         for value in ODD:
