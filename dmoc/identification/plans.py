@@ -51,7 +51,7 @@ def foresee(solution: Any, unknown: str | Sequence[str], noise: float, every: fl
     objective = Information(unknown, noise, every)
     twin = replace(problem, objective=objective)
     program, _ = unassembled(twin, solution.path, units_of(twin, solution.path))
-    matrix = fisher(program, solution.path) * solution.duration / (every * noise**2)
+    matrix = fisher(program, solution.path) * solution.duration / (objective.every * objective.noise**2)
     known = {one.name: one.value for one in constants_of(twin.effects)} | {MASS: problem.mass}
     count = len(objective.learns)
     size = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
