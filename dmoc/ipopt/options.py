@@ -10,6 +10,7 @@ import numpy as np
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.past_zones import has_sides
 from dmoc.motion.path import DiscretePath
+from dmoc.results.flown_cost import mass_worth
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
@@ -93,9 +94,9 @@ def settings_for(
     ):
         # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions,
         # and over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
-        size = FLAT if curved and problem.objective.metered else 1e-6
+        size = FLAT if curved and _meters(problem) else 1e-6
         settings |= dict.fromkeys(NEAR, size)
-    if _falls_past(problem, mesh) and not warm and not problem.objective.metered:
+    if _falls_past(problem, mesh) and not warm and not _meters(problem):
         # As there: the guess is the path of least effort, and past an attractor Ipopt does not come back to it.
         settings |= dict.fromkeys(NEAR, 1e-6)
     if warm:
@@ -144,6 +145,11 @@ def _falls_past(problem: TransferProblem, mesh: np.ndarray) -> bool:
     return problem.limited and several and not problem.free_duration and lengths.max() > UNEVEN * lengths.min()
 
 
+def _meters(problem: TransferProblem) -> bool:
+    """Whether the objective counts propellant or thrust, be it by the final mass."""
+    return problem.objective.metered or mass_worth(problem) != 0.0
+
+
 def _comes_to_zero(engine: Any) -> bool:
     """Whether a thrust may be none: where it never is, a barrier that may rise takes twice as long."""
     return getattr(engine, "min_thrust", 0.0) != engine.force_limit()
@@ -152,7 +158,7 @@ def _comes_to_zero(engine: Any) -> bool:
 def _barrier(problem: TransferProblem, warm: bool, carried: bool) -> dict[str, Any]:
     """Options for the barrier parameter, where it is better that it may also rise; none elsewhere."""
     rounded = problem.actuator.smoothing is not None
-    if rounded and problem.objective.metered and _comes_to_zero(problem.actuator):
+    if rounded and _meters(problem) and _comes_to_zero(problem.actuator):
         # With |F| rounded at zero, a barrier that only falls takes 3 to 30 times the iterations.
         settings: dict[str, Any] = {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "probing"}
         # Near the optimum full steps can go to and fro, 2,700 times in one case, each for hardly less violation

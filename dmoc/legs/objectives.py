@@ -41,6 +41,10 @@ class Share(Objective):
     def metered(self) -> bool:  # type: ignore[override]
         return self.whole.metered
 
+    @property
+    def paid_at_goal(self) -> Objective:
+        return self.whole
+
     def check_dimension(self, dimension: int) -> None:
         self.whole.check_dimension(dimension)
 

@@ -26,6 +26,7 @@ from dmoc.nlp.draft import ALL, Draft
 from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
 from dmoc.nlp.lesson import Lesson
 from dmoc.parts.rows import Row, built_in, title, with_symbols
+from dmoc.results.flown_cost import mass_worth
 from dmoc.scene.problem import TransferProblem
 
 # A stencil takes the first entry of a group: that of the start.
@@ -86,6 +87,9 @@ class Writer:
         for part in unknown:
             problem = with_field(problem, "inertia", part.moments)
         self.dynamics = Dynamics.of(problem, self.effects)
+        # A cost of the final mass is paid where propellant is burnt, as that of Fuel is: by the rows of the masses
+        # the two are the same. Paid at the goal alone, it took ten times the iterations, or did not end.
+        self.mass_worth = mass_worth(problem)
         self.lesson = Lesson(self) if problem.objective.learns else None
 
     def node(self) -> Stencil:
@@ -231,7 +235,8 @@ class Writer:
                 draft.limit(name, "end", rows, Owner("constraints", i, end))
         t, q, w, m = states["goal"]
         seen = self._seen((t, q, body.velocity(q, w), m))
-        draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*seen))
+        burnt = self.mass_worth * (states["start"][3] - m)
+        draft.cost = self.objective.sense * ca.SX(self.objective.terminal(*seen) + burnt)
         return draft.stencil("ends")
 
     def _links(self, draft: Draft, end: str, rows: Any) -> None:
@@ -251,7 +256,10 @@ class Writer:
 
     def _rate(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         t, q, v, m = self._seen((t, q, v, m))
-        return self.objective.sense * self.objective.rate(self.actuator, t, q, v, u, m)
+        rate = self.objective.rate(self.actuator, t, q, v, u, m)
+        if self.mass_worth:
+            rate = rate - self.mass_worth * self.actuator.flow(u)
+        return self.objective.sense * rate
 
     def _seen(self, state: tuple) -> tuple:
         """A state as an objective sees it: position and velocity of a body in space."""

@@ -9,12 +9,10 @@ import numpy as np
 from dmoc.guess.coast import held_up, turning_torque
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
-from dmoc.results.flown_cost import cost_functions
+from dmoc.results.flown_cost import costs_along
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
 
-# The size of the objective is estimated from this many nodes: more do not change its first digit.
-SAMPLED = 400
 # The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
 # A limit above this many times what moves or holds a body up is no unit of force [-], unless the cost is linear
@@ -83,7 +81,7 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     sizes = np.where(forces, force, torque)
     # All nozzles at once make no force, or next to none by rounding; one of them does.
     first = sizes * (np.arange(len(sizes)) == 0)
-    along, all_the_way, alone = map(abs, _costs_along(problem, guess, sizes, first))
+    along, all_the_way, alone = map(abs, costs_along(problem, guess, sizes, first, of_way=True))
     cost = max(along, all_the_way)
     cost = (cost if cost > LEAST_SHARE * alone else alone) or 1.0
     return Units(length, time, force, problem.mass, cost, torque, origin)
@@ -133,36 +131,3 @@ def _torque(problem: TransferProblem, guess: DiscretePath, without: float, limit
     if limit is not None:
         used = min(max(used, LEAST_SHARE * limit), limit) if used else limit
     return max(used, LEAST_SHARE * typical) if used else typical
-
-
-def cost_along(problem: TransferProblem, guess: DiscretePath) -> float:
-    """About the objective along a guess."""
-    return _costs_along(problem, guess)[0]
-
-
-def _costs_along(problem: TransferProblem, guess: DiscretePath, *instead: np.ndarray) -> list[float]:
-    """About the objective along a guess, and with each of these controls all the way.
-
-    A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
-    node it grows with the number of steps, so at the ends no more counts than the largest force in between.
-    """
-    rate, terminal = cost_functions(problem)
-    some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
-    fractions = guess.fractions[some]
-    times = problem.start_time + guess.duration * fractions
-    velocity = np.gradient(guess.place[some], times, axis=0)
-    sizes = np.linalg.norm(guess.control, axis=1)
-    most = sizes[1:-1].max(initial=0.0) or sizes.max()
-    control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
-    if guess.hold:
-        nodes = np.searchsorted(guess.mesh, fractions, side="right") - 1
-        some_controls = control[np.minimum(nodes, len(guess.mesh) - 2)]
-    else:
-        some_controls = control[some]
-    controls = [some_controls, *(np.broadcast_to(one, some_controls.shape) for one in instead)]
-    along = [times[None], guess.place[some].T, velocity.T, guess.mass[some][None]]
-    t, q, v, m = (np.tile(values, (1, len(controls))) for values in along)
-    rates = np.array(rate(t, q, v, np.concatenate(controls).T, m)).reshape(len(controls), -1)
-    last = guess.goal_velocity[guess.coordinates.speeds]
-    end = float(terminal(times[-1], guess.place[-1], last, guess.mass[-1]))
-    return [float(np.trapezoid(row, times)) + end for row in rates]

@@ -111,6 +111,11 @@ class Objective(Duties):
         """Value of what positions will tell, from how far each number moves the path: see `Information`."""
         return 0
 
+    @property
+    def paid_at_goal(self) -> Objective:
+        """The objective whose cost the goal has: another one for a leg of a mission."""
+        return self
+
     def unit_with(self, actuator: Actuator) -> str:
         """The unit of the objective with this actuator."""
         return self.unit

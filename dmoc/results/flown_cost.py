@@ -20,6 +20,8 @@ from dmoc.scene.problem import TransferProblem
 # An objective of 0 is replaced by this, the smallest number of full precision, before something is divided by
 # it.
 TINY = float(np.finfo(float).tiny)
+# The size of the objective is estimated from this many nodes: more do not change its first digit.
+SAMPLED = 400
 
 
 def unpriced(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, objective: float) -> float:
@@ -72,9 +74,69 @@ def cost_functions(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
     return remembered(partial(_written, problem), "cost", *parts)
 
 
+def mass_worth(problem: TransferProblem) -> float:
+    """By how much a unit of mass at the goal changes the objective [per kg], where propellant is burnt.
+
+    0 where nothing is burnt, or where that depends on the state.
+    """
+    if not problem.actuator.burns:
+        return 0.0
+    objective = problem.objective.paid_at_goal
+
+    def found() -> float:
+        t, q, v, m = state_symbols(int(configuration_of(problem).coordinates.places.sum()))
+        slope = ca.jacobian(ca.SX(objective.terminal(t, q, v, m)), m)
+        return float(slope) if slope.is_constant() else 0.0
+
+    return remembered(found, "worth of mass", configuration_of(problem), objective)
+
+
 def _written(problem: TransferProblem) -> tuple[ca.Function, ca.Function]:
     t, q, v, m = state_symbols(int(configuration_of(problem).coordinates.places.sum()))
     u = ca.SX.sym("u", problem.controls)
     rate = problem.objective.rate(problem.actuator, t, q, v, u, m)
     terminal = ca.Function("terminal", [t, q, v, m], [problem.objective.terminal(t, q, v, m)])
     return ca.Function("rate", [t, q, v, u, m], [rate]), terminal
+
+
+def cost_along(problem: TransferProblem, guess: DiscretePath) -> float:
+    """About the objective along a guess."""
+    return costs_along(problem, guess)[0]
+
+
+def costs_along(
+    problem: TransferProblem, guess: DiscretePath, *instead: np.ndarray, of_way: bool = False
+) -> list[float]:
+    """About the objective along a guess, and with each of these controls all the way.
+
+    A guess that leaves its start at another velocity than the start's has an impulse there. As the force of one
+    node it grows with the number of steps, so at the ends no more counts than the largest force in between.
+    `of_way`: a final mass counts as the propellant that is burnt on the way, but for legs of missions, which
+    have a unit of their own.
+    """
+    rate, terminal = cost_functions(problem)
+    some = np.linspace(0, len(guess.position) - 1, min(len(guess.position), SAMPLED)).astype(int)
+    fractions = guess.fractions[some]
+    times = problem.start_time + guess.duration * fractions
+    velocity = np.gradient(guess.place[some], times, axis=0)
+    sizes = np.linalg.norm(guess.control, axis=1)
+    most = sizes[1:-1].max(initial=0.0) or sizes.max()
+    control = guess.control * np.minimum(1.0, most / np.maximum(sizes, most or 1.0))[:, None]
+    if guess.hold:
+        nodes = np.searchsorted(guess.mesh, fractions, side="right") - 1
+        some_controls = control[np.minimum(nodes, len(guess.mesh) - 2)]
+    else:
+        some_controls = control[some]
+    controls = [some_controls, *(np.broadcast_to(one, some_controls.shape) for one in instead)]
+    along = [times[None], guess.place[some].T, velocity.T, guess.mass[some][None]]
+    t, q, v, m = (np.tile(values, (1, len(controls))) for values in along)
+    rates = np.array(rate(t, q, v, np.concatenate(controls).T, m)).reshape(len(controls), -1)
+    own = problem.objective.paid_at_goal is problem.objective
+    worth = mass_worth(problem) if of_way and own else 0.0
+    if worth:
+        u = ca.SX.sym("u", problem.controls)
+        flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(np.concatenate(controls).T)
+        rates = rates - worth * np.array(flow).reshape(rates.shape)
+    last = guess.goal_velocity[guess.coordinates.speeds]
+    end = float(terminal(times[-1], guess.place[-1], last, guess.mass[-1])) - worth * float(guess.mass[-1])
+    return [float(np.trapezoid(row, times)) + end for row in rates]

@@ -12,6 +12,7 @@ from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
 from dmoc.motion.flown import flown
+from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import MISSED, goal_miss
@@ -41,6 +42,9 @@ PAID, MOST_SHARPER = 1e-3, 4
 # Answers whose objectives differ by less than this part are one [-]: on one mesh Ipopt finds an optimum to
 # 1e-8.
 SAME_OBJECTIVE = 1e-6
+
+# Whether limits are enough where there are no zones shows on a mesh of so many steps.
+MOST_OPEN = 40
 
 # What a user is told of an answer that was mended, or could not be.
 LEAPT = "the first answer leapt a zone between two nodes: this one was found on a way past the zones"
@@ -242,7 +246,17 @@ def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
     if rung.answer.status not in UNEXPLAINED or any("max_" in name for name in ladder.options or ()):
         return False
     cause = rung.cause
-    return cause is None or cause.zones or not cause.hopeless
+    if cause is None or cause.zones or not cause.hopeless:
+        return True
+    zones = [zone for zone in ladder.problem.constraints if np.isfinite(zone.feature())]
+    if not zones:
+        return False
+    # A gap between zones that is as good as closed is passed between two nodes, at any force. Without zones
+    # such a limit is enough.
+    rest = [one for one in ladder.problem.constraints if one not in zones]
+    alone = replace(ladder.problem, constraints=rest)
+    guess = starting_guess(alone, uniform_mesh(MOST_OPEN), rung.nlp.scheme.degree * 2, rung.nlp.hold)
+    return ladder.ask(alone, guess, "whether the zones are to blame").solved
 
 
 def _deepest(ladder: Ladder, rung: Rung) -> float:

@@ -15,11 +15,11 @@ from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.units import cost_along
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
 from dmoc.rungs.rung import Rung
 from dmoc.rungs.tube import led
+from dmoc.results.flown_cost import cost_along
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 
