@@ -42,7 +42,19 @@ TESTS = (
         "missions",
         "diagnosis",
     ),
-    *("exports", "effects", "scene", "guess", "rungs", "meshes", "parts", "sensitivity", "teams", "structure"),
+    *(
+        "exports",
+        "effects",
+        "scene",
+        "guess",
+        "rungs",
+        "meshes",
+        "parts",
+        "sensitivity",
+        "teams",
+        "structure",
+        "identification",
+    ),
 )
 # A mutant is judged by tests that take so many seconds in all, and is dead if they take more than the second.
 ENOUGH, TOO_LONG = 40.0, 90.0

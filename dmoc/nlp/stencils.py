@@ -87,8 +87,8 @@ class Writer:
         for part in unknown:
             problem = with_field(problem, "inertia", part.moments)
         self.dynamics = Dynamics.of(problem, self.effects)
-        # A cost of the final mass is paid where propellant is burnt, as that of Fuel is: by the rows of the masses
-        # the two are the same. Paid at the goal alone, it took ten times the iterations, or did not end.
+        # A cost of the final mass is paid where propellant is burnt, as that of Fuel is: by the rows of masses
+        # the two are the same. Paid at the goal alone, it took five times the iterations, or did not end.
         self.mass_worth = mass_worth(problem)
         self.lesson = Lesson(self) if problem.objective.learns else None
 

@@ -1,4 +1,4 @@
-"""A mended answer: one that cuts zones between nodes, or that an independent integrator does not confirm."""
+"""A mended answer: one that an independent integrator does not confirm, or that is flown at another price."""
 
 from __future__ import annotations
 
@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.guess.past_zones import clear_ways
-from dmoc.guess.starting import starting_guess
-from dmoc.meshes.choices import ORDER_OF_UNEVEN, coarse_to_fine, rounding_stages, trial_path
+from dmoc.meshes.choices import ORDER_OF_UNEVEN, trial_path
 from dmoc.motion.flown import flown
-from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.momenta import end_momenta, node_velocities, velocity_along
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.reference import MISSED, goal_miss
@@ -21,69 +18,26 @@ from dmoc.results.between import Cut, cuts
 from dmoc.results.estimate import rounded_share
 from dmoc.results.flown_cost import unpriced
 from dmoc.rungs.rung import Rung
-from dmoc.solver.ladder import UNEXPLAINED, Ladder
+from dmoc.solver.ladder import Ladder
 
-# At most this many ways past the zones are tried, the shortest first: two sides of four zones.
-MOST_WAYS = 8
 # A mesh on which a zone is cut, or the goal missed, is made finer at most this many times: with twice the steps
 # each time that leaves an eighth of their length.
 MOST_FINER = 3
 # A step whose control is flown at another price than it was planned is cut into this many parts: its share of
 # the cost falls with its length.
 PARTS = 4
-# An answer that cuts a zone leaps it if it costs this part more or less on steps of half the length [-]: what
-# only grazes a zone there costs a thousandth more, and a leap ten times as much, as it has half the time.
-ANOTHER = 0.05
 # An answer that misses the goal by less than this part of the path is near the one on a finer mesh [-]: all of
 # four such answers led there, in 1 to 4 iterations, and one in six of those that missed it by more.
 NEAR = 0.1
 # Where the rounding of |F| costs more than this part [-], |F| is rounded over a tenth, at most so many times.
 PAID, MOST_SHARPER = 1e-3, 4
-# Answers whose objectives differ by less than this part are one [-]: on one mesh Ipopt finds an optimum to
-# 1e-8.
-SAME_OBJECTIVE = 1e-6
-
-# Whether limits are enough where there are no zones shows on a mesh of so many steps.
-MOST_OPEN = 40
 
 # What a user is told of an answer that was mended, or could not be.
-LEAPT = "the first answer leapt a zone between two nodes: this one was found on a way past the zones"
-FAILED = "the first guess led nowhere: this answer was found on a way past the zones"
 MADE_FINER = "the first mesh was too coarse for this motion: it was made finer"
 STILL_MISSED = (
     "the mesh is too coarse for this motion: an independent integrator misses the goal by {:.1g} of the path; "
     "ask for an accuracy, --tol 1e-4 (in Python tol=1e-4), which finds the mesh"
 )
-
-
-def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refined: bool) -> Rung:
-    """An answer that cuts no zone between its nodes, if there is one past the zones; else the answer as it is.
-
-    A path that leaps a zone between two nodes is an optimum of its mesh alone: finer meshes leap faster and
-    dearer. So the problem is solved anew from paths around the zones, on the coarsest mesh. The cheapest of
-    these answers that cuts no zone on the mesh of the first guess is taken; where the number of steps is open
-    (`refined`), steps that cut one are cut in two first. A failure among zones is treated alike.
-    """
-    if rung.stopped or not (_cuts(ladder, rung) if rung.solved else _zones_may_help(ladder, rung)):
-        return rung
-    finer, grazed = _grazed(ladder, rung) if refined and rung.solved else (rung, False)
-    if grazed or finer.stopped:
-        return finer
-    order, meshes = coarse_to_fine(ladder.problem, first)
-    base = starting_guess(ladder.problem, meshes[0], order, first.hold, given)
-    answers = [finer]
-    for way in clear_ways(ladder.problem, base)[:MOST_WAYS]:
-        answers.append(_sharpened(ladder, way))
-        if answers[-1].stopped:
-            return answers[-1]
-    found: list[Rung] = []
-    for one in _distinct(answers):
-        found.append(_cleared(ladder, one, first, refined))
-        if found[-1].stopped:
-            return found[-1]
-        if found[-1].solved and not _cuts(ladder, found[-1]):
-            return _noted(found[-1], LEAPT if rung.solved else FAILED)
-    return min([rung, *found], key=lambda one: _deepest(ladder, one))
 
 
 def on_shorter_steps(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any) -> tuple[Rung, DiscretePath]:
@@ -96,48 +50,6 @@ def on_shorter_steps(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any
         first = trial_path(ladder.problem, first.order, steps, first.hold, given)
         rung = ladder.climb_to(first, given)
     return rung, first
-
-
-def _grazed(ladder: Ladder, rung: Rung) -> tuple[Rung, bool]:
-    """The answer with the steps that cut a zone in two; whether that makes it clear at about the same cost."""
-    for _ in range(MOST_FINER):
-        path, before = rung.path, rung.cost
-        mesh = _shortened(path.mesh, _steps(_cuts(ladder, rung)))
-        finer = ladder.refine_on(path.onto(mesh, path.order, path.hold))
-        if not finer.solved:
-            return finer if finer.stopped else rung, False
-        rung = finer
-        if abs(rung.cost - before) > ANOTHER * abs(before):
-            return rung, False
-        if not _cuts(ladder, rung):
-            return rung, True
-    return rung, False
-
-
-def _distinct(answers: list[Rung]) -> list[Rung]:
-    """Those that were solved and differ in what they cost, the cheapest first."""
-    solved = sorted((one for one in answers if one.solved), key=lambda one: one.cost)
-    last, found = np.inf, []
-    for one in solved:
-        if not np.isclose(one.cost, last, rtol=SAME_OBJECTIVE, atol=0.0):
-            found.append(one)
-        last = one.cost
-    return found
-
-
-def _cleared(ladder: Ladder, rung: Rung, first: DiscretePath, refined: bool) -> Rung:
-    """An answer on the mesh of the first guess, with the steps that still cut a zone in two if `refined`."""
-    if len(rung.nlp.mesh) < len(first.mesh):
-        rung = ladder.refine_on(rung.path.onto(first.mesh, first.order, first.hold))
-    for _ in range(MOST_FINER if refined else 0):
-        if not (left := _cuts(ladder, rung)):
-            break
-        mesh = _shortened(rung.path.mesh, _steps(left))
-        finer = ladder.refine_on(rung.path.onto(mesh, first.order, first.hold))
-        if not finer.solved:
-            return finer if finer.stopped else rung
-        rung = finer
-    return rung
 
 
 def onto_goal(
@@ -167,8 +79,8 @@ def onto_goal(
         rung = finer if finer.solved or finer.stopped else rung
     else:
         if rung.solved and (miss := goal_missed(ladder, rung.path)) > MISSED:
-            return _noted(rung, STILL_MISSED.format(miss))
-    return rung if len(rung.nlp.mesh) <= len(first.mesh) else _noted(rung, MADE_FINER)
+            return noted(rung, STILL_MISSED.format(miss))
+    return rung if len(rung.nlp.mesh) <= len(first.mesh) else noted(rung, MADE_FINER)
 
 
 def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
@@ -182,12 +94,12 @@ def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
         if not rung.solved or _unpriced(ladder, rung) <= MISSED:
             break
         path, broken = rung.path, flown(ladder.dynamics, rung.path).broken
-        mesh = _shortened(path.mesh, np.flatnonzero(broken), PARTS)
+        mesh = shortened(path.mesh, np.flatnonzero(broken), PARTS)
         finer = ladder.refine_on(path.onto(mesh, path.order, path.hold), pinned)
         if not finer.solved:
             return finer if finer.stopped else rung
         rung = finer
-    return rung if rung is begun or MADE_FINER in rung.notes else _noted(rung, MADE_FINER)
+    return rung if rung is begun or MADE_FINER in rung.notes else noted(rung, MADE_FINER)
 
 
 def onto_magnitude(ladder: Ladder, rung: Rung) -> Rung:
@@ -211,13 +123,13 @@ def _unpriced(ladder: Ladder, rung: Rung) -> float:
     return unpriced(ladder.problem, ladder.dynamics, rung.path, rung.level.objective)
 
 
-def _noted(rung: Rung, note: str) -> Rung:
+def noted(rung: Rung, note: str) -> Rung:
     return replace(rung, notes=(*rung.notes, note))
 
 
 def is_flyable(ladder: Ladder, rung: Rung) -> bool:
     """Whether an answer is near one on a finer mesh: it cuts no zone, and hardly misses the goal."""
-    return not _cuts(ladder, rung) and goal_missed(ladder, rung.path) <= NEAR
+    return not cuts_of(ladder, rung) and goal_missed(ladder, rung.path) <= NEAR
 
 
 def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
@@ -231,40 +143,7 @@ def goal_missed(ladder: Ladder, path: DiscretePath) -> float:
     return float(np.nan_to_num(missed, nan=np.inf))
 
 
-def _sharpened(ladder: Ladder, guess: DiscretePath) -> Rung:
-    """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
-    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
-        rung = ladder.try_on(guess, width)
-        if not rung.solved:
-            break
-        guess = rung.path
-    return rung
-
-
-def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
-    """Whether a failure may be one of the way past zones, and not of limits that are far too small."""
-    if rung.answer.status not in UNEXPLAINED or any("max_" in name for name in ladder.options or ()):
-        return False
-    cause = rung.cause
-    if cause is None or cause.zones or not cause.hopeless:
-        return True
-    zones = [zone for zone in ladder.problem.constraints if np.isfinite(zone.feature())]
-    if not zones:
-        return False
-    # A gap between zones that is as good as closed is passed between two nodes, at any force. Without zones
-    # such a limit is enough.
-    rest = [one for one in ladder.problem.constraints if one not in zones]
-    alone = replace(ladder.problem, constraints=rest)
-    guess = starting_guess(alone, uniform_mesh(MOST_OPEN), rung.nlp.scheme.degree * 2, rung.nlp.hold)
-    return ladder.ask(alone, guess, "whether the zones are to blame").solved
-
-
-def _deepest(ladder: Ladder, rung: Rung) -> float:
-    """The deepest cut over the one that is allowed [-]; infinite for what was not solved."""
-    return max((cut.value / cut.allowed for cut in _cuts(ladder, rung)), default=0.0) if rung.solved else np.inf
-
-
-def _cuts(ladder: Ladder, rung: Rung) -> list[Cut]:
+def cuts_of(ladder: Ladder, rung: Rung) -> list[Cut]:
     """What cuts deeper between nodes than is allowed."""
     if not ladder.problem.constraints or not rung.solved:
         return []
@@ -289,12 +168,7 @@ def velocity_and_scales(ladder: Ladder, path: DiscretePath) -> tuple[np.ndarray,
     )
 
 
-def _steps(left: list[Cut]) -> np.ndarray:
-    """The steps that cut a zone."""
-    return np.concatenate([cut.steps for cut in left])
-
-
-def _shortened(mesh: np.ndarray, steps: np.ndarray, parts: int = 2) -> np.ndarray:
+def shortened(mesh: np.ndarray, steps: np.ndarray, parts: int = 2) -> np.ndarray:
     """The mesh with some steps and their neighbours cut into so many parts."""
     steps = np.unique(steps[:, None] + [-1, 0, 1])
     steps = steps[(steps >= 0) & (steps < len(mesh) - 1)]

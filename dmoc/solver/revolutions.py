@@ -17,9 +17,9 @@ from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.forces import FreeForce
 from dmoc.parts.objectives import Effort
+from dmoc.results.flown_cost import cost_along
 from dmoc.rungs.rung import Rung
 from dmoc.rungs.tube import led
-from dmoc.results.flown_cost import cost_along
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 

@@ -17,7 +17,8 @@ from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
-from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_magnitude, onto_price, past_zones
+from dmoc.solver.leapt import past_zones
+from dmoc.solver.mended import on_shorter_steps, onto_goal, onto_magnitude, onto_price
 from dmoc.solver.proven import holds
 from dmoc.solver.revolutions import best_revolutions
 from dmoc.solver.second_look import cheaper_revolutions

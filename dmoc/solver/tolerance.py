@@ -11,7 +11,8 @@ from dmoc.results.solution import Solution
 from dmoc.results.switches import is_singular
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
-from dmoc.solver.mended import on_shorter_steps, past_zones
+from dmoc.solver.leapt import past_zones
+from dmoc.solver.mended import on_shorter_steps
 from dmoc.solver.refinement import Refinement
 from dmoc.solver.second_look import cheaper_revolutions
 

@@ -91,3 +91,28 @@ def test_a_torque_that_the_angular_momentum_does_not_show_breaks_its_balance():
     control = found.path.control.copy()
     control[7] += 1e-4
     assert balance(Evidence(replace(found, path=replace(found.path, control=control))))[0] > 1e-6
+
+
+def floored(time):
+    """A hop far from the origin, where the rounding of positions sets the limit of the rollout."""
+    far, speed = 1e8, 1.0 / time
+    ends = State((far, 0.0), (0.1 * speed, 0.0)), State((far + 4.0, 1.0), (0.0, 0.0))
+    pull = UniformGravity((0.0, -0.3 / time**2))
+    return solve(TransferProblem(2.0, *ends, 4.0 * time, effects=[pull]), mesh=(0, 0.2, 0.5, 1))
+
+
+def test_the_limit_of_the_rollout_is_the_same_in_any_unit_of_time():
+    """It is a part of the path: rounding over its extent, and over the time of a step over its speed."""
+    checks = [verify(solution)["rollout"] for solution in map(floored, (1e-4, 1.0, 1e4))]
+    assert all(check.ok for check in checks)
+    np.testing.assert_allclose([check.limit for check in checks], checks[1].limit, rtol=1e-3)
+
+
+def test_the_limit_of_the_rollout_knows_how_short_steps_are_and_how_large_the_path():
+    """The rounding of a place over the extent, and over the shortest time between nodes, over the speed."""
+    solution = floored(1.0)
+    evidence = Evidence(solution)
+    assert evidence.shortest == pytest.approx(0.2 * 4.0)
+    # What the path amplifies, and turning by the acceleration, adds less than a fifth.
+    rounding = evidence.rounding * (1 / evidence.extent + 1 / (0.8 * evidence.speed))
+    assert verify(solution)["rollout"].limit == pytest.approx(rounding, rel=0.2)

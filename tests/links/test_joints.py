@@ -36,6 +36,7 @@ from dmoc import (
     rotation,
     simulate,
     solve,
+    transcribe,
     verify,
 )
 from dmoc.basics.quaternions import rotated, times, turned_by
@@ -638,3 +639,18 @@ def test_a_chain_that_hangs_is_solved_from_the_load_that_its_rods_carry():
     for one in (problem, free):
         found = solve(one)
         assert found.objective == pytest.approx(7.48577, rel=1e-5) and found.iterations < 60
+
+
+def test_what_parts_one_joint_shows_in_the_rows_of_that_joint_alone():
+    """The fore arm is moved: the shoulder holds, and the elbow's three rows of places are off."""
+    problem = arm()
+    program = transcribe(problem, 4)
+    path = starting_guess(problem, program.mesh, 2, False)
+    move = np.zeros(path.position.shape[1])
+    move[7:10] = 0.01, 0.02, 0.03
+    x = program.columns.scales() * program.pack(replace(path, position=path.position + move))
+    rows = program.assembly.constraints(x, program.parameters(problem)).full().ravel()
+    groups = [one for one in program.rows.groups if one.owner is not None and one.owner.field == "links"]
+    shoulder, elbow = (group.of(rows).reshape(-1, 5) for group in groups if group.kind == "node")
+    assert np.abs(shoulder).max() < 1e-12
+    assert (np.abs(elbow) > 1e-6).tolist() == [[True, True, True, False, False]] * 5

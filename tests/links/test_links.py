@@ -387,3 +387,13 @@ def test_a_scene_without_links_has_nothing_of_them():
     found = solve(free, steps=10)
     assert found.reaction is None and found.path.reaction is None
     assert [check.name for check in verify(found).checks].count("constraint") == 0
+
+
+@pytest.mark.parametrize("order", [2, 6])
+def test_a_held_torque_acts_along_the_rod_wherever_the_path_is(order):
+    """About a pivot away from the middle of the path: the march and the integrator have places of their own."""
+    pivot = Rod((3.0, -2.0), 1.0)
+    ends = State((3, -3), (0, 0)), State((4, -2), (0, 0))
+    problem = TransferProblem(1.0, *ends, 2.0, effects=[DOWN], links=[pivot], actuator=JointTorque(pivot))
+    report = verify(solve(problem, order, steps=60, hold=True).raise_for_status())
+    assert all(report[name].ok for name in ("residual", "rollout", "reference", "ledger", "constraint"))

@@ -4,7 +4,20 @@ from dataclasses import replace
 
 import pytest
 
-from dmoc import Drop, Effort, Engine, FinalMass, Fuel, Leg, Mission, Nozzles, State, TransferProblem, solve, verify
+from dmoc import (
+    Drop,
+    Effort,
+    Engine,
+    FinalMass,
+    Fuel,
+    Leg,
+    Mission,
+    Nozzles,
+    State,
+    TransferProblem,
+    solve,
+    verify,
+)
 
 CROSS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 ENGINES = {

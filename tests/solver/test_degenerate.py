@@ -257,8 +257,8 @@ SYMMETRIC = {
 def test_a_line_through_the_middle_of_a_zone_finds_a_way_round(name):
     problem, known = SYMMETRIC[name]
     found = certified(problem)
-    # Between two that touch, the barrier that adapts goes nowhere for as long as one attempt may last; over thirty
-    # random scenes of one to three zones it takes a fifth fewer iterations.
+    # Between two that touch, the barrier that adapts goes nowhere for as long as one attempt may last; over
+    # thirty random scenes of one to three zones it takes a fifth fewer iterations.
     lost = 150 if "one behind" in name else 0
     assert found.objective == pytest.approx(known, rel=1e-4) and found.iterations < 100 + lost
 

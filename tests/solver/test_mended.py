@@ -39,7 +39,7 @@ def test_what_was_red_is_mended(case, numerics, right):
 
 @SLOW
 def test_where_zones_leave_a_gap_that_is_as_good_as_closed_the_ways_round_all_are_tried():
-    """Between the zones the path takes more than fifty times the force, as a leap; past them 0.9 N is enough."""
+    """Between the zones a path takes over fifty times the force, as a leap; past them the force is enough."""
     zones = [KeepOut((4.14, 0.09), 0.42), KeepOut((3.97, -0.6), 0.59), KeepOut((4.22, 0.44), 0.54)]
     ends, push = (State((0, 0), (0, 0)), State((8, 0), (0, 0))), BoxForce(2.0)
     found = solve(TransferProblem(1.0, *ends, 8.0, actuator=push, constraints=zones))
