@@ -647,8 +647,8 @@ def test_what_parts_one_joint_shows_in_the_rows_of_that_joint_alone():
     program = transcribe(problem, 4)
     path = starting_guess(problem, program.mesh, 2, False)
     move = np.zeros(path.position.shape[1])
-    move[7:10] = 0.01, 0.02, 0.03
-    x = program.columns.scales() * program.pack(replace(path, position=path.position + move))
+    move[3:6] = 0.01, 0.02, 0.03
+    x = program.pack(replace(path, position=path.position + move))
     rows = program.assembly.constraints(x, program.parameters(problem)).full().ravel()
     groups = [one for one in program.rows.groups if one.owner is not None and one.owner.field == "links"]
     shoulder, elbow = (group.of(rows).reshape(-1, 5) for group in groups if group.kind == "node")
