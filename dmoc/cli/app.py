@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import redirect_stdout
+from copy import copy
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -271,13 +272,21 @@ for _verb, _example in (
     app.command(epilog=f"Example: {_example}")(_verb)
 
 
+def _only(verb: str) -> typer.Typer:
+    """The command line with this verb alone, where it is one: the options of all others take longer than a solve."""
+    named = [info for info in app.registered_commands if verb in (info.name, getattr(info.callback, "__name__", ""))]
+    alone = copy(app)
+    alone.registered_commands = named or app.registered_commands
+    return alone
+
+
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; every bad input becomes one line on stderr and exit code 2."""
     from dmoc.scene.problem_file import users_line
 
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = app(args=given, standalone_mode=False) or SOLVED
+        code = _only(given[0])(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
         verb = f"{error.ctx.info_name} " if error.ctx and error.ctx.parent else ""
         fail(f"error: {error.format_message()} (dmoc {verb}--help)", BAD_INPUT)
