@@ -273,8 +273,12 @@ for _verb, _example in (
 
 
 def _only(verb: str) -> typer.Typer:
-    """The command line with this verb alone, where it is one: the options of all others take longer than a solve."""
-    named = [info for info in app.registered_commands if verb in (info.name, getattr(info.callback, "__name__", ""))]
+    """The command line with this verb alone, if it is one: to read the options of all others takes time."""
+    named = [
+        info
+        for info in app.registered_commands
+        if verb in (info.name, info.callback and info.callback.__name__)
+    ]
     alone = copy(app)
     alone.registered_commands = named or app.registered_commands
     return alone
