@@ -242,18 +242,9 @@ def export(
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
 
 
-@app.command(epilog="Example: dmoc doctor")
-def doctor() -> None:
-    """Say what this computer has: versions, linear solvers, a C compiler, cores, and how fast it solves."""
-    from dmoc.reports import words as report
-    from dmoc.reports.tables import findings_table
-    from dmoc.studies.computer import examine
-
-    report.console().print(findings_table(examine()))
-
-
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (pages_command.doctor, "dmoc doctor"),
     (pages_command.report, "dmoc report flight.nc --out flight.html"),
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
@@ -274,13 +265,10 @@ for _verb, _example in (
 
 def _only(verb: str) -> typer.Typer:
     """The command line with this verb alone, if it is one: to read the options of all others takes time."""
-    named = [
-        info
-        for info in app.registered_commands
-        if verb in (info.name, info.callback and info.callback.__name__)
-    ]
-    alone = copy(app)
-    alone.registered_commands = named or app.registered_commands
+    alone, every = copy(app), app.registered_commands
+    alone.registered_commands = [
+        one for one in every if verb in (one.name, getattr(one.callback, "__name__", None))
+    ] or every
     return alone
 
 

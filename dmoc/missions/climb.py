@@ -36,7 +36,7 @@ MOST_TRYING = 200
 ACCURATE, MOST_MENDED = 1e-5, 3
 # Near to the answer Ipopt is asked for this [-]: at limits the barrier leaves an error of that size.
 SHARP = 1e-12
-# That is near the rounding of the rows: three iterations without a gain, with no barrier left, are the end there.
+# That is near the rounding of the rows: three iterations without a gain end a run that has no barrier left.
 ENDING = {"ipopt.tol": SHARP, "ipopt.acceptable_iter": 3, "ipopt.acceptable_compl_inf_tol": 10 * SHARP}
 # There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
 STAYING = 1.0

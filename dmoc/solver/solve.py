@@ -54,10 +54,10 @@ def solve(
     )
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
-        solution = _solved(ladder, order, steps, tol, hold, mesh, guess, sharp)
+        solution = _solved(ladder, order, steps, tol, hold, mesh, guess, sharp=sharp)
 
         def again(paths: list[DiscretePath]) -> Solution | None:
-            other = _solved(ladder, order, steps, tol, hold, mesh, *paths, sharp)
+            other = _solved(ladder, order, steps, tol, hold, mesh, *paths, sharp=sharp)
             return other if other.optimal else None
 
         if solution.optimal:

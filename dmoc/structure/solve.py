@@ -28,9 +28,9 @@ from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
-# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, over the second one where
-# the first shows an arc that is hardly there, and over the third in a second coarse answer: where the fuel hardly
-# depends on where it burns, a wide rounding hides short burns.
+# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, over the second one
+# if an arc is hardly there, over the third in a second coarse answer: where the fuel hardly depends on
+# where it burns, a wide rounding hides short burns.
 WIDE, ROUNDED, LESS_ROUNDED = 1e-2, 1e-3, 1e-4
 # An arc is clearly there if it is longer than so many times the way from one node to the next [-].
 CLEAR = 3.0
@@ -181,7 +181,7 @@ def has_switches(problem: TransferProblem) -> bool:
 
 
 def _is_clear(coarse: Solution) -> bool:
-    """Whether a coarse answer shows its arcs well enough: where |F| is not rounded, or none of them is short."""
+    """Whether a coarse answer shows its arcs well: |F| is not rounded, or none of them is short."""
     if coarse.require_problem().actuator.smoothing is None:
         return True
     shortest = np.diff([0.0, *(arc.end for arc in arcs_of(coarse))]).min()
