@@ -79,6 +79,7 @@ def _solved(
     hold: bool,
     mesh: Any,
     guess: Any,
+    *,
     sharp: bool = True,
 ) -> Solution:
     problem = ladder.problem
