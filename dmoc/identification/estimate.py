@@ -104,11 +104,11 @@ class Estimate:
         kept = np.flatnonzero(~hidden)
         found = np.full((len(scale), len(scale)), np.nan)
         if len(kept):
-            inverse = self.fit.covariance()
+            factor = self.chi_squared / self.fit.degrees if self.found_noise and self.fit.degrees > 0 else 1.0
+            inverse = factor * self.fit.covariance()
             found[np.ix_(kept, kept)] = (inverse * np.outer(scale, scale))[np.ix_(kept, kept)]
         found[hidden, hidden] = np.inf
-        factor = self.chi_squared / self.fit.degrees if self.found_noise and self.fit.degrees > 0 else 1.0
-        return found * factor
+        return found
 
     @cached_property
     def _hidden(self) -> np.ndarray:

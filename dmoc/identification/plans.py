@@ -41,14 +41,21 @@ def foresee(solution: Any, unknown: str | Sequence[str], noise: float, every: fl
     Raises
     ------
     ValueError
-        If the solution is not such a one, or there is no such number.
+        If the solution is not such a one, there is no such number, or nothing is measured on the flight.
     """
     of_kind("solution", solution, Outcome)
     problem = solution.require_problem()
     if not isinstance(solution, Solution):
         raise ValueError("foresee takes the solution of one transfer, not that of a mission or of a team")
     solution.path.refuse_unusable("solution")
+    if not solution.optimal:
+        raise ValueError(f"foresee needs a path that can be flown; this solve ended with {solution.status!r}")
     objective = Information(unknown, noise, every)
+    if objective.every > solution.duration:
+        raise ValueError(
+            f"every is {objective.every:g} s, longer than the flight of {solution.duration:g} s, on which nothing "
+            f"is measured then; give at most {solution.duration:g} s"
+        )
     twin = replace(problem, objective=objective)
     program, _ = unassembled(twin, solution.path, units_of(twin, solution.path))
     matrix = fisher(program, solution.path) * solution.duration / (objective.every * objective.noise**2)
@@ -82,6 +89,7 @@ def plan_for(estimate: Estimate, problem: TransferProblem | None = None, **chang
     ValueError
         If the identification failed, or a number of it is not observable.
     """
+    of_kind("estimate", estimate, Estimate)
     if not estimate.success:
         raise ValueError(f"the identification failed: {estimate.message}")
     if blind := [name for name, sigma in estimate.sigma.items() if not np.isfinite(sigma)]:

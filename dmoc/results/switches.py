@@ -122,7 +122,7 @@ def corners(problem: TransferProblem, path: DiscretePath, objective: float) -> n
     for key, density in path.multipliers.items():
         if key.kind not in ("node", "control", "step"):
             continue
-        share = np.abs(density).max(axis=1) / len(density) * sizes.get(key, 1.0)
+        share = np.abs(density).max(axis=1, initial=0.0) / len(density) * sizes.get(key, 1.0)
         if key == POSITION_BOUNDS:
             # At the ends, bounds hold fixed positions: they are no limits that set in.
             share[[0, -1]] = 0.0

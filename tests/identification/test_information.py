@@ -10,6 +10,7 @@ from dmoc import (
     Coast,
     Effort,
     Engine,
+    Flight,
     Information,
     LinearDrag,
     Mission,
@@ -23,6 +24,7 @@ from dmoc import (
     fly,
     foresee,
     identify,
+    plan_for,
     simulate,
     solve,
     transcribe,
@@ -170,3 +172,24 @@ def test_what_has_no_meaning_is_refused(plans, tmp_path):
     refused("transfer alone", lambda: Team([one, one]))
     refused("another objective", lambda: export(one, tmp_path / "out"))
     refused("solution must be", lambda: foresee(one, "mass", NOISE, EVERY))
+
+
+def test_what_was_not_solved_and_what_is_measured_after_the_flight_foretell_nothing(plans):
+    with pytest.raises(ValueError, match=r"every is 30 s, longer than the flight of 20 s.*at most 20 s"):
+        foresee(plans[0], "mass", NOISE, 30.0)
+    failed = hop(actuator=BallForce(0.01))
+    with pytest.raises(ValueError, match="a path that can be flown; this solve ended with"):
+        foresee(failed, "mass", NOISE, EVERY)
+
+
+@pytest.mark.parametrize("wrong", [None, "a plan"])
+def test_a_plan_is_made_for_an_estimate_alone(wrong):
+    with pytest.raises(ValueError, match=r"estimate must be a dmoc\.Estimate; got"):
+        plan_for(wrong)
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_stands_still_without_a_force_tells_no_mass():
+    still = np.zeros((4, 1))
+    found = identify(Flight([0.0, 1.0, 2.0, 3.0], still, still), mass=Unknown(2.0))
+    assert np.isinf(found.sigma["mass"])

@@ -29,7 +29,8 @@ LOST = {"free body": (1.4e-5, 5e-5, 3.5e-5), "heavy top": (0.015, 0.04, 0.04)}
 def test_nothing_is_lost_in_a_hundred_thousand_steps(body, order):
     (found,) = spin(BODIES[body](), STEPS, {order: LENGTHS[order]})
     assert found.norm_error < 1e-14
-    assert found.momentum_error < 1e-11
+    # Rounding of half a unit in the last place a step, were it all one way, would add up to this.
+    assert found.momentum_error < 0.5 * STEPS * np.finfo(float).eps
     assert found.growth < 1.1 or found.energy_error < ROUNDED
 
 
