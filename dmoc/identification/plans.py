@@ -53,8 +53,8 @@ def foresee(solution: Any, unknown: str | Sequence[str], noise: float, every: fl
     objective = Information(unknown, noise, every)
     if objective.every > solution.duration:
         raise ValueError(
-            f"every is {objective.every:g} s, longer than the flight of {solution.duration:g} s, on which nothing "
-            f"is measured then; give at most {solution.duration:g} s"
+            f"every is {objective.every:g} s, longer than the flight of {solution.duration:g} s: nothing would "
+            f"be measured on it; give at most {solution.duration:g} s"
         )
     twin = replace(problem, objective=objective)
     program, _ = unassembled(twin, solution.path, units_of(twin, solution.path))

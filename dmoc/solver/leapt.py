@@ -11,7 +11,6 @@ from dmoc.diagnosis.cause import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import coarse_to_fine, rounding_stages
-from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.results.between import Cut
 from dmoc.rungs.rung import Rung
@@ -26,8 +25,6 @@ ANOTHER = 0.05
 # Answers whose objectives differ by less than this part are one [-]: on one mesh Ipopt finds an optimum to
 # 1e-8.
 SAME_OBJECTIVE = 1e-6
-# Whether limits are enough where there are no zones shows on a mesh of so many steps.
-MOST_OPEN = 40
 # What a user is told of an answer that was mended, or could not be.
 LEAPT = "the first answer leapt a zone between two nodes: this one was found on a way past the zones"
 # What a user is told of an answer that was mended, or could not be.
@@ -139,7 +136,7 @@ def _zones_may_help(ladder: Ladder, rung: Rung) -> bool:
     # such a limit is enough.
     rest = [one for one in ladder.problem.constraints if one not in zones]
     alone = replace(ladder.problem, constraints=rest)
-    guess = starting_guess(alone, uniform_mesh(MOST_OPEN), rung.nlp.scheme.degree * 2, rung.nlp.hold)
+    guess = starting_guess(alone, ladder.rungs[0].nlp.mesh, rung.path.order, rung.path.hold)
     return ladder.ask(alone, guess, "whether the zones are to blame").solved
 
 

@@ -3,6 +3,7 @@
 Where a message names the least that is needed, a tenth less does not do.
 """
 
+import inspect
 import re
 from dataclasses import replace
 
@@ -10,32 +11,46 @@ import casadi as ca
 import numpy as np
 import pytest
 
+import dmoc
 from dmoc import (
+    Actuator,
     ApproachCone,
     Attitude,
     BallForce,
+    BallTorque,
     BoxForce,
     ClohessyWiltshire,
+    Constraint,
     Engine,
     Fuel,
+    JointForce,
+    JointState,
+    JointTorque,
     KeepIn,
     KeepOut,
     LinearDrag,
+    Member,
+    MomentumLimit,
     Moving,
     Nozzles,
+    On,
     PointingKeepIn,
     PointingKeepOut,
     Pose,
+    Prismatic,
     RateLimit,
+    Revolute,
     RotatingFrame,
     SpeedLimit,
     Spring,
     State,
+    System,
     Thrusters,
     Time,
     Torque,
     TransferProblem,
     UniformGravity,
+    Wheels,
     Wrench,
     rotation,
     solve,
@@ -130,6 +145,27 @@ def pushed(thrust, duration):
     return TransferProblem(
         3.0, Pose((0, 0, 0)), goal, duration, inertia=J, actuator=Thrusters(PLACES, WAYS, thrust)
     )
+
+
+HINGE = Revolute((0, 0, 1), on="b", to="a")
+SLIDE = Prismatic((1, 0, 0), on="b", to="a")
+
+
+def jointed(joint, actuator, duration=3.0, rate=0.0, **more):
+    """Two free bodies and a joint between them, opened by half a metre or radian."""
+    ends = {"a": Pose((0, 0, 0)), joint: JointState(0.0, rate)}, {joint: JointState(0.5)}
+    members = [Member("a", 3.0, J), Member("b", 2.0, (0.4, 0.5, 0.6))]
+    return TransferProblem(System(members, [joint]), *ends, duration, actuator=actuator, **more)
+
+
+def wheeled(torque, momentum, duration=4.0, **more):
+    return turn(60, (0, 0, 1), duration, actuator=Wheels(np.eye(3).tolist(), torque, momentum), **more)
+
+
+def stored(momentum, duration):
+    """Wheels without a limit of their own, but with one in the scene."""
+    limit = MomentumLimit((momentum,) * 3)
+    return wheeled(3.0, None, duration, constraints=[limit])
 
 
 LIMIT = "a force limit of # N [(]"
@@ -255,6 +291,48 @@ SCENES = {
         {"steps": 40},
         [((0, 1), f"{RATE}.*? and {SPEED}"), ((2,), SECONDS)],
     ),
+    "ball torque": (
+        lambda x, t: turn(60, (0, 0, 1), t, actuator=BallTorque(x)),
+        (0.2, 4.0),
+        {"steps": 24},
+        [((0,), TORQUE), ((1,), SECONDS)],
+    ),
+    "motors of wheels": (
+        lambda x, t: wheeled(x, None, t),
+        (0.2, 4.0),
+        {"steps": 24},
+        [((0,), "a motor torque of # N m [(]"), ((1,), SECONDS)],
+    ),
+    "what wheels store": (
+        lambda x, t: wheeled(3.0, x, t),
+        (0.5, 4.0),
+        {"steps": 24},
+        [((0,), "a max_momentum of # N m s [(]"), ((1,), SECONDS)],
+    ),
+    "a limit of momentum": (
+        stored,
+        (0.5, 4.0),
+        {"steps": 24},
+        [((0,), "a momentum limit of # N m s [(]"), ((1,), SECONDS)],
+    ),
+    "a motor in a hinge": (
+        lambda x, t: jointed(HINGE, JointTorque(HINGE, x), t),
+        (0.05, 3.0),
+        {"steps": 20},
+        [((0,), "a joint torque of # N m in"), ((1,), SECONDS)],
+    ),
+    "a motor in a slide": (
+        lambda x, t: jointed(SLIDE, JointForce(SLIDE, x), t),
+        (0.05, 3.0),
+        {"steps": 20},
+        [((0,), "a joint force of # N in"), ((1,), SECONDS)],
+    ),
+    "pushes on one of two bodies": (
+        lambda x, y, t: jointed(HINGE, On("a", Wrench(x, y)), t),
+        (0.1, 0.1, 3.0),
+        {"steps": 20},
+        [((0, 1), f"{LIMIT}.*? and {TORQUE}"), ((2,), SECONDS)],
+    ),
     "thrusters": (pushed, (0.2, 6.0), {"steps": 16}, [((0,), THRUST), ((1,), SECONDS)]),
     "a passage": (under, (1.0,), {"steps": 100}, [((0,), RADIUS.format(2))]),
     "a passage that is leapt": (under, (0.72,), {"steps": 100}, [((0,), RADIUS.format(2))]),
@@ -293,6 +371,47 @@ def remedied(given, which, numbers, share=1.0):
     return values
 
 
+# Where each part with a limit that a message may name is followed.
+FOLLOWED = {
+    "ApproachCone": "an approach cone",
+    "BallForce": "force",
+    "BallTorque": "ball torque",
+    "BoxForce": "force of two axes",
+    "Engine": "engine",
+    "JointForce": "a motor in a slide",
+    "JointTorque": "a motor in a hinge",
+    "KeepOut": "a passage",
+    "MomentumLimit": "a limit of momentum",
+    "Nozzles": "nozzles of their own",
+    "On": "pushes on one of two bodies",
+    "PointingKeepIn": "two cones",
+    "PointingKeepOut": "two cones",
+    "RateLimit": "rate",
+    "SpeedLimit": "speed",
+    "Thrusters": "thrusters",
+    "Torque": "torques of three axes",
+    "Wheels": "what wheels store",
+    "Wrench": "force and torque",
+}
+# Several actuators are relaxed each as by itself, and the sides of a room and the stops of a joint stand for a
+# wall: they are never said to be in the way.
+NOT_NAMED = {"JointLimit", "KeepIn", "Several"}
+
+
+def test_every_limit_that_can_be_named_is_followed():
+    """What can be eased, or told what is needed in its place, has a scene above; a new part needs one."""
+    kinds = (getattr(dmoc, name) for name in dmoc.__all__)
+    parts = [kind for kind in kinds if inspect.isclass(kind) and issubclass(kind, (Actuator, Constraint))]
+    base = vars(Actuator) | vars(Constraint)
+    eased = {
+        kind.__name__
+        for kind in parts
+        if any(getattr(kind, name, None) is not base.get(name) for name in ("eased", "times", "needs"))
+    } - {"Actuator", "Constraint", "FreeForce", "Unpowered"}
+    assert eased == set(FOLLOWED) | NOT_NAMED
+    assert set(FOLLOWED.values()) <= set(SCENES)
+
+
 # These take four seconds and more; the others run every time.
 LONG = {
     "rate",
@@ -304,7 +423,23 @@ LONG = {
     "two zones",
     "an approach cone",
 }
-EVERY = [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SCENES]
+# Not kept yet: what is named is not enough on the mesh of the scene, or the limit is left out of the problem.
+SHORT = {
+    "motors of wheels": "the numbers that are named leave a check red on 24 steps",
+    "a motor in a hinge": "the duration that is named leaves a check red on 20 steps",
+    "pushes on one of two bodies": "the force and torque that are named are not enough",
+    "a limit of momentum": "a MomentumLimit beside Wheels without max_momentum is left out",
+}
+SLOW = LONG | set(SHORT) | {"ball torque", "what wheels store", "a motor in a slide"}
+
+
+def marked(name):
+    marks = [pytest.mark.slow] if name in SLOW else []
+    marks += [pytest.mark.xfail(strict=True, reason=SHORT[name])] if name in SHORT else []
+    return pytest.param(name, marks=marks)
+
+
+EVERY = [marked(name) for name in SCENES]
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -11,6 +11,7 @@ RK4 with the shortest of these steps, 0.1 s, is off by 1.5e-5, 5.7e-5 and 3.9e-5
 of the free body and by 0.017, 0.045 and 0.043 of the top's, ten times as much in the end as in the first tenth.
 """
 
+import numpy as np
 import pytest
 
 from dmoc.studies.spinning import LENGTHS, free_body, heavy_top, spin
