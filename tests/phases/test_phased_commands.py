@@ -48,11 +48,10 @@ def test_it_is_solved_saved_checked_converted_and_shown(folder, capsys):
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (("export", "delivery", "planner"), "a team of missions of several legs is not exported"),
         (("effects", "delivery"), "is a team of bodies"),
         (("solve", "delivery", "--impulses", "auto"), "a dmoc.Team has neither"),
         (("solve", "delivery", "--set", "distance=9"), "but are to keep 9 m"),
-        (("solve", "delivery", "--worth", "--steps", "12"), "not of a team of missions"),
+        (("solve", "delivery", "--set", "load=-1"), "Drop: mass"),
     ],
 )
 def test_what_it_cannot_is_refused_in_one_line(folder, capsys, arguments, said):
