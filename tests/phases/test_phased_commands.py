@@ -63,7 +63,7 @@ def test_the_page_and_the_film_show_the_joint_and_both_bodies():
     found = solve(load_problem("delivery").make(), steps=8)
     page = figure(found, verify(found))
     path, forces, *_ = page.axes
-    (joint,) = [line for line in path.lines if line.get_label() == "_joints"]
+    (joint,) = [line for line in path.lines if line.get_label() == "joint"]
     assert joint.get_xydata()[0] == pytest.approx([1.0, 0.5])
     begin = found.members[0].legs[1].provenance.start_time
     assert any(list(line.get_xdata()) == [begin, begin] for line in forces.lines)
