@@ -117,8 +117,8 @@ BODIES = {
 PHASES = {
     "others": "each joint, and of what holds between bodies",
     "between": """All bodies have one clock, which is cut into phases where some body
-has a joint, in the order that the guess has; legs of a body follow each other. What happens between them, such as
-an impulse, stands in the plan: add it to the velocity before the next rollout.""",
+has a joint, in the order that the guess has; legs of a body follow each other. What happens between them, such
+as an impulse, stands in the plan: add it to the velocity before the next rollout.""",
     "fixed": """the order of joints, what events are made of, the distances that
 bodies keep, and the meshes""",
 }

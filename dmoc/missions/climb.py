@@ -53,8 +53,11 @@ OTHER_DURATIONS = (0.5, 2.0, 0.25, 4.0)
 class Climb:
     """The attempts at one mission, in their order."""
 
-    # What sees it as Ipopt does.
+    # What sees it as Ipopt does, and what makes a solution of an attempt.
     program: Any = MissionProgram
+    answered: Any = answered
+    # Order, steps, whether forces are held, and the guess, as they were asked for.
+    asked: tuple[int | None, int | None, bool, Any] = (None, None, False, None)
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
@@ -69,6 +72,40 @@ class Climb:
         self.held: Attempt | None = None
         # What is in the way, where no attempt succeeded, and what another start led to.
         self.reason = self.told = ""
+
+    def solve(self, path: MissionPath, tol: float | None, given: bool) -> Any:
+        """From a path to the answer; on its meshes alone if these are given and there is no tolerance."""
+        with self.interrupt:
+            first = self.first(path)
+            if not first.solved:
+                return self.answered(first)
+            first = self.prepared(first, path)
+            if given and tol is None:
+                return self.answered(first)
+            return self.answered(*self.finished(first, path, tol), tol)
+
+    def first(self, path: MissionPath) -> Attempt:
+        """The first answer or, where none is found, an attempt that failed and why."""
+        first = self.attempt(path) if path.warm else self.from_guess(path)
+        if not (first.solved or path.warm or self.interrupt.seen):
+            first = self.otherwise(first, path)
+        return first if first.solved else self.explained(path, first)
+
+    def otherwise(self, attempt: Attempt, path: Any) -> Attempt:
+        """What else is tried where a guess leads to no answer."""
+        return attempt
+
+    def prepared(self, first: Attempt, path: Any) -> Attempt:
+        """The first answer with parts dropped at the best time, no thrust reversed, and graded steps."""
+        order, steps, hold, guess = self.asked
+        if not path.warm and guess is None:
+            first = with_best_drops(self, first, lambda one: first_path(one, order, steps, hold, None))
+        first = straightened(self, first, MOST_TRYING)
+        return self.regraded(first, meshes_along(self.mission, first.path, order, steps))
+
+    def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
+        """The answer on fine meshes, its error, and whether that is what was asked for."""
+        return self.refined(first, tol)
 
     def attempt(self, path: MissionPath, *args: Any, **how: Any) -> Attempt:
         """Solve on the meshes of a path, and again where the answer hardly takes the force of its units."""
@@ -249,20 +286,8 @@ def solve_mission(
     if mesh is not None:
         raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
     climb = Climb(mission, options, progress, compiled, time_limit)
-    path = first_path(mission, order, steps, hold, guess)
-    with climb.interrupt:
-        first = climb.attempt(path) if path.warm else climb.from_guess(path)
-        if not first.solved:
-            first = climb.explained(path, first)
-        if not first.solved:
-            return answered(climb, first)
-        if not path.warm and guess is None:
-            first = with_best_drops(climb, first, lambda one: first_path(one, order, steps, hold, None))
-        first = straightened(climb, first, MOST_TRYING)
-        first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
-        if steps is not None and tol is None:
-            return answered(climb, first)
-        return answered(climb, *climb.refined(first, tol), tol)
+    climb.asked = order, steps, hold, guess
+    return climb.solve(first_path(mission, order, steps, hold, guess), tol, steps is not None)
 
 
 def _change(coarse: Attempt, fine: Attempt) -> float:

@@ -12,7 +12,7 @@ from dmoc.basics.digits import lasting
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
 from dmoc.guess.starting import angle_around
-from dmoc.meshes.choices import first_path
+from dmoc.meshes.choices import TRIAL_ORDER, TRIAL_STEPS, first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
@@ -25,7 +25,7 @@ from dmoc.solver.solve import check_numerics, solve
 from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen, without_waiting
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
-from dmoc.structure.modes import FREE
+from dmoc.structure.modes import FREE, names_of
 from dmoc.structure.solution import structured
 
 # |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, and in the second one:
@@ -170,8 +170,9 @@ def can_be_parted(problem: TransferProblem) -> bool:
 
 
 def has_switches(problem: TransferProblem) -> bool:
-    """Whether an answer may have more than one arc: of full thrust and none, or with and without contacts."""
-    return (bool(problem.constraints) or is_switched(problem)) and can_be_parted(problem)
+    """Whether an answer may have several arcs: of full thrust and none, contacts, or limits of a force."""
+    several = bool(problem.constraints) or is_switched(problem) or bool(names_of(problem))
+    return several and can_be_parted(problem)
 
 
 def coarse_answer(
@@ -188,6 +189,15 @@ def coarse_answer(
             # On a singular arc forces of order 2 do not chatter.
             order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
             steps = COARSE_STEPS[order]
+        fixed = bool(problem.constraints) and not problem.free_duration
+        if order == TRIAL_ORDER and fixed and more.get("guess") is None:
+            # Around zones there are several optima: a solve to a tolerance begins so, and leads to the same.
+            trial = solve(problem, order, TRIAL_STEPS, **more)
+            if trial.success:
+                found = solve(problem, order, steps, **more | {"guess": trial.path})
+                return replace(found, ladder=(*trial.ladder, *found.ladder)) if found.success else trial
+            if trial.status in ENDED:
+                return trial
     return solve(problem, order, steps, **more)
 
 
