@@ -186,8 +186,9 @@ def lacking(
 ) -> tuple[int, str, np.ndarray] | None:
     """The leg in which another limit is kept to, what its controls do there, and by how much at its nodes.
 
-    `touching` says which legs end with the touch of a zone. A limit that is kept to is in the way where its multiplier has the sign of the other side; one that is not
-    kept to is to be where it acts, by `least` as in `kinds_along`.
+    `touching` says which legs end with the touch of a zone. A limit that is kept to is in the way where its
+    multiplier has the sign of the other side; one that is not kept to is to be where it acts, by `least` as in
+    `kinds_along`.
     """
     names = names_of(problem)
     pushes = [pushing(problem, path) for path in paths]

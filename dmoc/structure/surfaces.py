@@ -108,7 +108,7 @@ def pierced(
     problem: TransferProblem,
     path: DiscretePath,
     begin: float,
-    known: tuple[Container[Surface] | None, Container[Surface] | None] = (None, None),
+    known: tuple[Container | None, Container | None] = (None, None),
 ) -> list[tuple[float, Surface]]:
     """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit.
 
