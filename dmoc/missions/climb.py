@@ -222,21 +222,30 @@ class Climb:
         return again if again.solved else attempt
 
     def refined(
-        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE, still: float = np.inf
+        self,
+        attempt: Attempt,
+        tol: float | None,
+        accurate: float = ACCURATE,
+        still: float = np.inf,
+        seen: bool = True,
     ) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
 
         Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
-        by about the part `still` of it.
+        by about the part `still` of it, which is `seen` on one more mesh at least if steps do not show it.
         """
         error: Error | None = None
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
-            rest = left_after(changes) if changes else 0.0
+            rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
-            onto = attempt.path.finer(attempt.errors)
+            errors = attempt.errors
+            if attempt.largest_error <= min(accurate, tol or np.inf):
+                # What is left is in none of the steps more than in others.
+                errors = [np.ones_like(each) for each in errors]
+            onto = attempt.path.finer(errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)

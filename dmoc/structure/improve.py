@@ -41,7 +41,8 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
     more: list[Arc] = []
     missing = [_wrong(arcs, i, leg) for i, leg in enumerate(found.legs)] if is_switched(problem) else []
     # At both of its switches the function of a leg is zero, but for the errors of its steps.
-    doubt = max(WRONG, *(DOUBT * abs(float(wrong[-1])) for wrong in missing[1:-1]), 0.0)
+    both = [i for i in range(1, len(missing) - 1) if all(_is_switch(*arcs[k : k + 2]) for k in (i - 1, i))]
+    doubt = max([WRONG, *(DOUBT * abs(float(missing[i][-1])) for i in both)])
     missing = [np.where(wrong > doubt, wrong, 0.0) for wrong in missing]
     for i, wrong in enumerate(missing):
         # At a switch the function is zero but for errors; at a touch of a burn or of a coast it need not be.

@@ -244,11 +244,13 @@ def _improved(
         known, first, found = settled
         arcs = known
         if first.solved:
-            attempt, found = _of_high_order(climb, problem, first, found, tol)
+            # Where controls keep to a limit they may be wrong between nodes on steps that fly them exactly.
+            seen = all(arc.alike == (FREE, None) for arc in arcs)
+            attempt, found = _of_high_order(climb, problem, first, found, tol, seen)
             # What meshes of low order do not show may be seen now, and is, before they are refined.
             arcs = known if attempt is first else improved(problem, known, found)
             if alike(arcs, known):
-                last, error, met = climb.refined(attempt, tol, ACCURATE, STILL)
+                last, error, met = climb.refined(attempt, tol, ACCURATE, STILL, seen)
                 found = answered(climb, last, error, met, tol)
                 arcs = improved(problem, known, found) if found.optimal and last is not attempt else arcs
         legs = found.legs
@@ -297,10 +299,18 @@ def _settled(
 
 
 def _of_high_order(
-    climb: Climb, problem: TransferProblem, attempt: Attempt, found: MissionSolution, tol: float | None
+    climb: Climb,
+    problem: TransferProblem,
+    attempt: Attempt,
+    found: MissionSolution,
+    tol: float | None,
+    seen: bool,
 ) -> tuple[Attempt, MissionSolution]:
-    """The attempt and the answer on meshes of high order, where those it was found on are not fine enough."""
-    if attempt.largest_error <= (ACCURATE if tol is None else tol):
+    """The attempt and the answer on meshes of high order, where those it was found on are not fine enough.
+
+    That is not `seen` by the errors of steps where controls keep to a limit.
+    """
+    if seen and attempt.largest_error <= (ACCURATE if tol is None else tol):
         return attempt, found
     course = Course.of(found.legs)
     path = attempt.path
