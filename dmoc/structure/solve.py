@@ -88,7 +88,10 @@ def solve_by_structure(
     coarse = coarse_answer(problem, order, steps, **more)
     if coarse.success and not _is_clear(coarse):
         again = coarse_answer(problem, coarse.order, coarse.steps, ROUNDED, **more | {"guess": coarse.path})
-        coarse = replace(again, ladder=(*coarse.ladder, *again.ladder))
+        if again.status in ENDED:
+            return again
+        # Where that one is not found, or not in time, the first one stands.
+        coarse = replace(again, ladder=(*coarse.ladder, *again.ladder)) if again.success else coarse
     if not coarse.success:
         return coarse if coarse.status in ENDED else None
     found = _by_arcs(problem, coarse, tol, more)
