@@ -15,7 +15,7 @@ from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Interrupt, Watch
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
-from dmoc.missions.attempt import Attempt
+from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.solution import MissionSolution
@@ -24,9 +24,8 @@ from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import left_after
 from dmoc.results.facts import Error, Level
-from dmoc.rungs.rung import rounded, settled
+from dmoc.rungs.rung import settled
 from dmoc.scene.mission import Mission
-from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
 from dmoc.solver.solve import check_numerics
 
@@ -129,7 +128,7 @@ class Climb:
         with which parameter of the barrier [-].
         """
         begun, mission = time.perf_counter(), self.mission
-        problems = [_rounded(problem, rounding) for problem in mission.stretches]
+        problems = [rounded_to(problem, rounding) for problem in mission.stretches]
         program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
@@ -241,11 +240,7 @@ class Climb:
             rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
-            errors = attempt.errors
-            if attempt.largest_error <= min(accurate, tol or np.inf):
-                # What is left is in none of the steps more than in others.
-                errors = [np.ones_like(each) for each in errors]
-            onto = attempt.path.finer(errors)
+            onto = attempt.path.finer(attempt.to_cut(accurate if tol is None else tol))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)
@@ -253,7 +248,7 @@ class Climb:
                 return found, error, False
             if not found.solved:
                 break
-            changes.append(_change(attempt, found))
+            changes.append(change(attempt, found))
             attempt = found
             if tol is not None:
                 error = self._error(attempt, changes, attempt.largest_error)
@@ -299,13 +294,3 @@ def solve_mission(
     climb = Climb(mission, options, progress, compiled, time_limit)
     climb.asked = order, steps, hold, guess
     return climb.solve(first_path(mission, order, steps, hold, guess), tol, steps is not None)
-
-
-def _change(coarse: Attempt, fine: Attempt) -> float:
-    """What the objective changes from mesh to mesh, of itself [-]."""
-    scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
-    return abs(fine.level.objective - coarse.level.objective) / scale
-
-
-def _rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:
-    return problem if problem.actuator.smoothing is None else rounded(problem, rounding)

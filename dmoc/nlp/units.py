@@ -17,6 +17,8 @@ from dmoc.scene.problem import TransferProblem
 SAMPLED = 400
 # The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
+# A body that moves less than this [m] stands still: its square is no number that divides any more.
+TINY = 1e-100
 # A limit above this many times what moves or holds a body up is no unit of force [-], unless the cost is linear
 # in it: at 1e5 N for 1e-5 N the barrier ended at eight times the least effort, as good as zero.
 FAR_ABOVE = 100.0
@@ -62,10 +64,10 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     origin = np.where(places, 0.5 * (low + high), 0.0)
     time = guess.duration
     both = np.array([guess.start_velocity, guess.goal_velocity])[:, speeds]
-    extent = guess.diagonal
-    if extent < least_extent(problem.mass, problem.inertia):
-        extent = 0.0
-    length = extent or float(np.abs(both).max(initial=0.0) * time) or 1.0
+    # What rounding leaves of none is none.
+    least = max(least_extent(problem.mass, problem.inertia), TINY)
+    lengths = guess.diagonal, float(np.abs(both).max(initial=0.0) * time)
+    length = next((one for one in lengths if one > least), 1.0)
     change = length / time
     if not problem.effects:
         # Without effects the actuator alone must change the velocities of both ends into the mean one.

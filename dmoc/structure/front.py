@@ -220,7 +220,7 @@ def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
         or not (tol < TIGHT or getattr(problem, "free_duration", False))
     ):
         return False
-    from dmoc.structure.solve import can_be_parted, has_switches, is_switched
+    from dmoc.structure.arcs import can_be_parted, has_switches, is_switched
 
     return has_switches(problem) if tol < TIGHT else is_switched(problem) and can_be_parted(problem)
 

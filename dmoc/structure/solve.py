@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.digits import lasting
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
-from dmoc.guess.starting import angle_around
 from dmoc.meshes.choices import TRIAL_ORDER, TRIAL_STEPS, first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
@@ -22,24 +20,31 @@ from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.rungs.rung import cut_short
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.solve import check_numerics, solve
-from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen, without_waiting
+from dmoc.structure.arcs import (
+    Arc,
+    alike,
+    arcs_of,
+    can_be_parted,
+    is_clear,
+    is_switched,
+    plain,
+    surely_seen,
+    told,
+    without_waiting,
+)
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
-from dmoc.structure.modes import FREE, names_of
+from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
 # |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, over the second one
 # if an arc is hardly there, over the third in a second coarse answer: where the fuel hardly depends on
 # where it burns, a wide rounding hides short burns.
 WIDE, ROUNDED, LESS_ROUNDED = 1e-2, 1e-3, 1e-4
-# An arc is clearly there if it is longer than so many times the way from one node to the next [-].
-CLEAR = 3.0
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
 COARSE_STEPS = {2: 60, 4: 30}
 # A second coarse answer has so many times the steps.
 FINER = 3
-# Over more revolutions than this there are too many arcs.
-MOST_TURNS = 10
 # Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that
 # something switches inside a leg.
 SETTLED = 1e-6
@@ -86,7 +91,7 @@ def solve_by_structure(
     if not can_be_parted(problem):
         return None
     coarse = coarse_answer(problem, order, steps, **more)
-    if coarse.success and not _is_clear(coarse):
+    if coarse.success and not is_clear(coarse):
         again = coarse_answer(problem, coarse.order, coarse.steps, ROUNDED, **more | {"guess": coarse.path})
         if again.status in ENDED:
             return again
@@ -168,30 +173,6 @@ def _is_settled(found: MissionSolution, coarse: int) -> bool:
     return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)
 
 
-def can_be_parted(problem: TransferProblem) -> bool:
-    """Whether arcs can be seen: of one body that does not turn, in few revolutions."""
-    return not (
-        problem.turns
-        or problem.links
-        or any(part.turns_body or part.point for part in problem.constraints)
-        or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
-    )
-
-
-def has_switches(problem: TransferProblem) -> bool:
-    """Whether an answer may have several arcs: of full thrust and none, contacts, or limits of a force."""
-    several = bool(problem.constraints) or is_switched(problem) or bool(names_of(problem))
-    return several and can_be_parted(problem)
-
-
-def _is_clear(coarse: Solution) -> bool:
-    """Whether a coarse answer shows its arcs well: |F| is not rounded, or none of them is short."""
-    if coarse.require_problem().actuator.smoothing is None:
-        return True
-    shortest = np.diff([0.0, *(arc.end for arc in arcs_of(coarse))]).min()
-    return bool(shortest * (len(coarse.path.fractions) - 1) > CLEAR)
-
-
 def coarse_answer(
     problem: TransferProblem, order: int | None, steps: int | None, rounded: float = WIDE, **more: Any
 ) -> Solution:
@@ -216,12 +197,6 @@ def coarse_answer(
             if trial.status in ENDED:
                 return trial
     return solve(problem, order, steps, sharp=False, **more)
-
-
-def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
-    """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
-    lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
-    return f"{len(arcs)} leg{'s' * (len(arcs) > 1)}: {', '.join(lengths)}"
 
 
 def verdict(found: MissionSolution) -> Report:
