@@ -18,8 +18,6 @@ from dmoc.scene.problem import TransferProblem
 SAMPLED = 400
 # The unit of force is at least this part of the limit [-], however small the largest force of a solution is.
 LEAST_SHARE = 1e-3
-# A body that moves less than this [m] stands still: its square is no number that divides any more.
-TINY = 1e-100
 # A limit above this many times what moves or holds a body up is no unit of force [-], unless the cost is linear
 # in it: at 1e5 N for 1e-5 N the barrier ended at eight times the least effort, as good as zero.
 FAR_ABOVE = 100.0
