@@ -9,7 +9,7 @@ import numpy as np
 from dmoc.basics.numerics import columns
 from dmoc.guess.coast import held_up, turning_torque
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
+from dmoc.motion.scales import LEAST_TURN, TINY, least_extent, path_scales
 from dmoc.results.flown_cost import cost_functions
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
