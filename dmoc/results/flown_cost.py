@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.numerics import columns
 from dmoc.configurations.acting import state_symbols
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
@@ -130,7 +131,7 @@ def costs_along(
     controls = [some_controls, *(np.broadcast_to(one, some_controls.shape) for one in instead)]
     along = [times[None], guess.place[some].T, velocity.T, guess.mass[some][None]]
     t, q, v, m = (np.tile(values, (1, len(controls))) for values in along)
-    rates = np.array(rate(t, q, v, np.concatenate(controls).T, m)).reshape(len(controls), -1)
+    rates = columns(rate, t, q, v, np.concatenate(controls).T, m)[0].reshape(len(controls), -1)
     own = problem.objective.paid_at_goal is problem.objective
     worth = mass_worth(problem) if of_way and own else 0.0
     if worth:

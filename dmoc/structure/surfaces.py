@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -10,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.basics.numerics import cubic_spline
+from dmoc.basics.numerics import columns, cubic_spline
 from dmoc.effects.base import Body
 from dmoc.legs.events import Event, Instant, Passed
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
@@ -92,7 +93,7 @@ def room(
     gap, limit = remembered(lambda: _gap(constraint, surface, size), "gap", constraint, surface, size)
     begin = problem.start_time if begin is None else begin
     times, masses = begin + path.duration * at, np.interp(at, path.fractions, path.mass)
-    values = gap(times[None], places.T, masses[None]).full().ravel()
+    values = columns(gap, times, places.T, masses)[0].ravel()
     return (limit - values) * (1 if surface.upper else -1)
 
 
@@ -103,8 +104,16 @@ def _gap(constraint: Constraint, surface: Surface, size: int) -> tuple[ca.Functi
     return ca.Function("gap", [t, q, m], [gap]), limit
 
 
-def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[tuple[float, Surface]]:
-    """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit."""
+def pierced(
+    problem: TransferProblem,
+    path: DiscretePath,
+    begin: float,
+    known: tuple[Container | None, Container | None] = (None, None),
+) -> list[tuple[float, Surface]]:
+    """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit.
+
+    `known` are the limits that the joints at its begin and at its end touch; None is all of them.
+    """
     at = (
         path.fractions[:-1, None] + np.diff(path.fractions)[:, None] * np.linspace(0, 1, BETWEEN + 1)[:-1]
     ).ravel()
@@ -116,8 +125,9 @@ def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[
         scale = float(np.ptp(broken))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], broken > PIERCED * scale, [0]])))
         for first, last in edges.reshape(-1, 2):
-            # What begins or ends at a joint is that joint's.
-            if first > 1 and last < len(at) - 1:
+            # What begins or ends at a joint that touches the limit is that joint's.
+            theirs = first <= 1, last >= len(at) - 1
+            if not any(ends and (of is None or surface in of) for ends, of in zip(theirs, known, strict=True)):
                 found.append((float(at[first + int(np.argmax(broken[first:last]))]), surface))
     return found
 
