@@ -193,7 +193,9 @@ PARTS = {
     "DeltaV": lambda: legs(Impulse(), Coast(4.0), Impulse(), objective=DeltaV()),
     "State": lambda: hop(goal=State((2, None), (0, None))),
     "Condition": lambda: hop(
-        goal=Condition(lambda t, q, v, m: ca.dot(q, q) - 4, "circle", 4.0, State((None, None), (0, 0)))
+        goal=Condition(lambda t, q, v, m: ca.dot(q, q) - 4, "circle", 4.0, State((None, None), (0, 0))),
+        # In the middle of the circle no way leads nearer to it than any other.
+        start=State((0.5, 0), (0, 0)),
     ),
     "Moving": lambda: hop(goal=moving()),
     "Moving, Time": lambda: hop(goal=moving(), objective=Time(), duration=(0.5, 6.0)),
