@@ -18,6 +18,7 @@ from dmoc.missions.answer import answered, straightened
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
+from dmoc.missions.sharper import onto_magnitude
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
@@ -260,6 +261,8 @@ def solve_mission(
             first = with_best_drops(climb, first, lambda one: first_path(one, order, steps, hold, None))
         first = straightened(climb, first, MOST_TRYING)
         first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
+        # Meshes are refined for the problem that the answer is of.
+        first = onto_magnitude(climb, first)
         if steps is not None and tol is None:
             return answered(climb, first)
         return answered(climb, *climb.refined(first, tol), tol)
