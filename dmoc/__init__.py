@@ -28,40 +28,40 @@ if TYPE_CHECKING:
     from dmoc.checks.verification import Check as Check
     from dmoc.checks.verification import Report as Report
     from dmoc.conversions.convert import convert as convert
-    from dmoc.effects import J2 as J2
-    from dmoc.effects import Atmosphere as Atmosphere
-    from dmoc.effects import Body as Body
-    from dmoc.effects import BodyConservative as BodyConservative
-    from dmoc.effects import BodyForce as BodyForce
-    from dmoc.effects import ClohessyWiltshire as ClohessyWiltshire
-    from dmoc.effects import ConicalShadow as ConicalShadow
-    from dmoc.effects import Conservative as Conservative
-    from dmoc.effects import CylindricalShadow as CylindricalShadow
-    from dmoc.effects import Drag as Drag
-    from dmoc.effects import Effect as Effect
-    from dmoc.effects import ExponentialAtmosphere as ExponentialAtmosphere
-    from dmoc.effects import Force as Force
-    from dmoc.effects import LinearDrag as LinearDrag
-    from dmoc.effects import PointGravity as PointGravity
-    from dmoc.effects import RadiationPressure as RadiationPressure
-    from dmoc.effects import RotatingFrame as RotatingFrame
-    from dmoc.effects import Shadow as Shadow
-    from dmoc.effects import Spring as Spring
-    from dmoc.effects import ThirdBody as ThirdBody
-    from dmoc.effects import UniformAtmosphere as UniformAtmosphere
-    from dmoc.effects import UniformGravity as UniformGravity
-    from dmoc.effects import Wind as Wind
-    from dmoc.effects import circular_motion as circular_motion
-    from dmoc.effects import kepler_motion as kepler_motion
-    from dmoc.effects import tabulated_motion as tabulated_motion
-    from dmoc.effects import three_body as three_body
     from dmoc.effects.air import TabulatedAtmosphere as TabulatedAtmosphere
     from dmoc.effects.air import msis_atmosphere as msis_atmosphere
+    from dmoc.effects.atmosphere import Atmosphere as Atmosphere
+    from dmoc.effects.atmosphere import Drag as Drag
+    from dmoc.effects.atmosphere import ExponentialAtmosphere as ExponentialAtmosphere
+    from dmoc.effects.atmosphere import LinearDrag as LinearDrag
+    from dmoc.effects.atmosphere import UniformAtmosphere as UniformAtmosphere
+    from dmoc.effects.atmosphere import Wind as Wind
+    from dmoc.effects.base import Body as Body
+    from dmoc.effects.base import BodyConservative as BodyConservative
+    from dmoc.effects.base import BodyForce as BodyForce
+    from dmoc.effects.base import Conservative as Conservative
+    from dmoc.effects.base import Effect as Effect
+    from dmoc.effects.base import Force as Force
     from dmoc.effects.bodies import GravityGradient as GravityGradient
     from dmoc.effects.bodies import PivotGravity as PivotGravity
     from dmoc.effects.bodies import PlateDrag as PlateDrag
     from dmoc.effects.bodies import PlateRadiation as PlateRadiation
     from dmoc.effects.bodies import Plates as Plates
+    from dmoc.effects.frames import ClohessyWiltshire as ClohessyWiltshire
+    from dmoc.effects.frames import RotatingFrame as RotatingFrame
+    from dmoc.effects.frames import three_body as three_body
+    from dmoc.effects.gravity import J2 as J2
+    from dmoc.effects.gravity import PointGravity as PointGravity
+    from dmoc.effects.gravity import Spring as Spring
+    from dmoc.effects.gravity import UniformGravity as UniformGravity
+    from dmoc.effects.motion import circular_motion as circular_motion
+    from dmoc.effects.motion import kepler_motion as kepler_motion
+    from dmoc.effects.motion import tabulated_motion as tabulated_motion
+    from dmoc.effects.radiation import ConicalShadow as ConicalShadow
+    from dmoc.effects.radiation import CylindricalShadow as CylindricalShadow
+    from dmoc.effects.radiation import RadiationPressure as RadiationPressure
+    from dmoc.effects.radiation import Shadow as Shadow
+    from dmoc.effects.third_body import ThirdBody as ThirdBody
     from dmoc.ends.base import Boundary as Boundary
     from dmoc.ends.base import State as State
     from dmoc.ends.conditions import Condition as Condition

@@ -70,13 +70,15 @@ def pushes(solution: Any) -> tuple[float, float, float]:
     dynamics = Dynamics.of(solution.problem)
     known, rule = flown(dynamics, path), scheme(path.order)
     lengths = np.diff(known.mesh)
+    # Where the body is matters to what is fixed to one that turns.
+    anywhere = not dynamics.wrench.jac_sparsity(0, 0).nnz()
 
     def wrench(inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fractions of the duration, and what the actuator does there, at such fractions of the pieces."""
         values = rule.values_at(inside.ravel()).reshape(*inside.shape, -1)
         control = np.einsum("kpj,jkn->kpn", values, known.nodes)
         fractions = np.clip(known.mesh[:-1, None] + lengths[:, None] * inside, 0.0, 1.0)
-        places = moving(solution, fractions.ravel())[0]
+        places = path.position[:1] if anywhere else moving(solution, fractions.ravel())[0]
         found = wrench_of(dynamics, places, control.reshape(fractions.size, -1))
         return fractions, found.reshape(*fractions.shape, -1)
 

@@ -6,11 +6,14 @@ Importing SciPy takes longer.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+# A function of columns is evaluated in so many at once; a longer map takes long to make.
+MOST_COLUMNS = 512
 # Two unknowns whose coupling is below this [-], the unknowns being near 1, are solved separately: no digit
 # changes.
 UNCOUPLED = 1e-17
@@ -193,3 +196,63 @@ def in_plain_memory(
     stats = buffer.stats()
     # Calls are counted on from run to run.
     return outputs, stats | {n: stats[n] - before.get(n, 0) for n in stats if n.startswith("n_call")}
+
+
+def columns(function: ca.Function, *given: Any) -> tuple[np.ndarray, ...]:
+    """The outputs of a function for many columns, one evaluation for each, side by side as CasADi has them.
+
+    CasADi's own call takes 6 µs a column, whatever the function: 70 ms for 12,000 in place of 1.3 ms.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Its inputs are dense.
+    *given : arrays, shape (rows, columns)
+        One for each input; what has one column, or is a number, is the same in all evaluations.
+    """
+    inputs = [_of_columns(one, function.numel_in(i)) for i, one in enumerate(given)]
+    count = max(map(len, inputs))
+    inputs = [np.ascontiguousarray(np.broadcast_to(one, (count, one.shape[1]))) for one in inputs]
+    outputs = [np.empty((count, function.nnz_out(i))) for i in range(function.n_out())]
+    for first in range(0, count, MOST_COLUMNS):
+        part = slice(first, min(first + MOST_COLUMNS, count))
+        these, those = ([one[part] for one in each] for each in (inputs, outputs))
+        _evaluate(_side_by_side(function, part.stop - first), these, those)
+    return tuple(_dense(values, function.sparsity_out(i)) for i, values in enumerate(outputs))
+
+
+def _of_columns(given: Any, size: int) -> np.ndarray:
+    """Columns as rows of this size."""
+    values = np.atleast_2d(np.asarray(given, float)).T
+    if not size:
+        return np.zeros((1, 0))
+    return np.full((1, size), values.item()) if values.size == 1 else values.reshape(-1, size)
+
+
+@lru_cache(maxsize=256)
+def _side_by_side(function: ca.Function, count: int) -> ca.Function:
+    return function.map(count) if count > 1 else function
+
+
+def _evaluate(function: ca.Function, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> None:
+    """Evaluate a function from arrays into arrays, which hold the nonzeros column by column."""
+    buffer, evaluate = function.buffer()
+    for i, values in enumerate(inputs):
+        if values.size:
+            buffer.set_arg(i, memoryview(values))  # type: ignore[arg-type]
+    for i, values in enumerate(outputs):
+        if values.size:
+            buffer.set_res(i, memoryview(values))  # type: ignore[arg-type]
+    evaluate()
+    if buffer.ret():
+        raise RuntimeError(f"CasADi cannot evaluate {function.name()!r}")
+
+
+def _dense(values: np.ndarray, sparsity: ca.Sparsity) -> np.ndarray:
+    """Matrices side by side, by the nonzeros of each, one row a matrix."""
+    rows, across = sparsity.shape
+    if not sparsity.is_dense():
+        full = np.zeros((len(values), rows * across))
+        full[:, sparsity.find()] = values
+        values = full
+    return values.reshape(len(values) * across, rows).T

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.configurations.acting import point_function
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import Flown, flown
@@ -106,10 +107,9 @@ class Evidence:
         Per unit mass: accelerations [m/s^2], then torques in body axes [m^2/s^2].
         """
         resting = point_function(self.problem.effects, self.dynamics.configuration, kinetic=False)
-        state = self.time[None], self.position.T, self.node_velocity.T, self.mass[None]
-        dldq, _, push = resting(*state)
-        parts = (ca.densify(part).full().T for part in (dldq, push))
-        pull, work = (along_path(self.dynamics, self.position, part) for part in parts)
+        state = self.time, self.position.T, self.node_velocity.T, self.mass
+        dldq, _, push = columns(resting, *state)
+        pull, work = (along_path(self.dynamics, self.position, part.T) for part in (dldq, push))
         return pull, work
 
     def per_mass(self, wrench: np.ndarray | float, mass: np.ndarray) -> np.ndarray:
@@ -144,7 +144,7 @@ class Evidence:
         held = self.dynamics.configuration.joined
         if not held or self.path.reaction is None:
             return np.zeros((len(self.position), self.dynamics.freedom))
-        bars = self.dynamics.bars(self.position.T).full().reshape(held, len(self.position), -1)
+        bars = columns(self.dynamics.bars, self.position.T)[0].reshape(held, len(self.position), -1)
         return -np.einsum("rkn,kr->kn", bars, self.path.reaction[:, -held:]) * self.weights[:, None]
 
     @cached_property
@@ -177,7 +177,7 @@ class Evidence:
         held = self.dynamics.configuration.joined
         if not held:
             return 0.0
-        bars = self.dynamics.bars(self.position.T).full().reshape(held, len(self.position), -1)
+        bars = columns(self.dynamics.bars, self.position.T)[0].reshape(held, len(self.position), -1)
         bars = bars / np.linalg.norm(bars, axis=2, keepdims=True)
         return float(np.arccos(np.clip(np.sum(bars[:, 1:] * bars[:, :-1], axis=2).min(), -1.0, 1.0)))
 

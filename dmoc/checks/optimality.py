@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.mesh import node_weights
 from dmoc.nlp.program import Program
@@ -107,10 +108,10 @@ def _evaluate(blocks: list, nlp: NLP, x: np.ndarray, p: np.ndarray, lam_g: np.nd
     for block in blocks:
         known, constant = block.kernel.used
         given = unknowns[block.columns], block.values[known], p[constant], multipliers[block.targets], 1.0
-        values = block.kernel.slope(*given)
-        np.add.at(slope, block.columns, values[0].full())
-        np.add.at(rows, block.targets, values[1].full())
-        cost += float(values[2].full().sum())
+        slopes, values, costs = columns(block.kernel.slope, *given)
+        np.add.at(slope, block.columns, slopes)
+        np.add.at(rows, block.targets, values)
+        cost += float(costs.sum())
     return slope * nlp.columns.scales() / nlp.units.cost, rows * nlp.rows.scales(), cost / nlp.units.cost
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import redirect_stdout
+from copy import copy
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -241,18 +242,9 @@ def export(
     console.print(f"wrote {len(paths)} files to {folder}; README.md there says how to use them")
 
 
-@app.command(epilog="Example: dmoc doctor")
-def doctor() -> None:
-    """Say what this computer has: versions, linear solvers, a C compiler, cores, and how fast it solves."""
-    from dmoc.reports import words as report
-    from dmoc.reports.tables import findings_table
-    from dmoc.studies.computer import examine
-
-    report.console().print(findings_table(examine()))
-
-
 # Verbs that take more than a page have files of their own.
 for _verb, _example in (
+    (pages_command.doctor, "dmoc doctor"),
     (pages_command.report, "dmoc report flight.nc --out flight.html"),
     (paths_command.simulate, "dmoc simulate orbit_raise --steps 2000 --order 4 --plot coast.png"),
     (paths_command.convert, "dmoc convert flight.nc --to csv"),
@@ -271,13 +263,22 @@ for _verb, _example in (
     app.command(epilog=f"Example: {_example}")(_verb)
 
 
+def _only(verb: str) -> typer.Typer:
+    """The command line with this verb alone, if it is one: to read the options of all others takes time."""
+    alone, every = copy(app), app.registered_commands
+    alone.registered_commands = [
+        one for one in every if verb in (one.name, getattr(one.callback, "__name__", None))
+    ] or every
+    return alone
+
+
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; every bad input becomes one line on stderr and exit code 2."""
     from dmoc.scene.problem_file import users_line
 
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
-        code = app(args=given, standalone_mode=False) or SOLVED
+        code = _only(given[0])(args=given, standalone_mode=False) or SOLVED
     except USAGE_ERROR as error:
         verb = f"{error.ctx.info_name} " if error.ctx and error.ctx.parent else ""
         fail(f"error: {error.format_message()} (dmoc {verb}--help)", BAD_INPUT)

@@ -85,3 +85,12 @@ def point_of(file: Path, out: Path | None) -> tuple[Any, Path] | None:
 
 def is_page(path: Path) -> bool:
     return path.suffix.lower() in (".html", ".htm")
+
+
+def doctor() -> None:
+    """Say what this computer has: versions, linear solvers, a C compiler, cores, and how fast it solves."""
+    from dmoc.reports import words as report
+    from dmoc.reports.tables import findings_table
+    from dmoc.studies.computer import examine
+
+    report.console().print(findings_table(examine()))

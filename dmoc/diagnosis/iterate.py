@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.configurations.acting import state_symbols
 from dmoc.effects.base import Effect
 from dmoc.motion.dynamics import Dynamics
@@ -36,7 +37,7 @@ def refuse_undefined_motion(dynamics: Dynamics, problem: TransferProblem, guess:
     """
     with np.errstate(all="ignore"):
         state = _states(dynamics, problem, guess)
-        if not all(np.isfinite(value.full()).all() for value in dynamics.point(*state)):
+        if not all(np.isfinite(value).all() for value in columns(dynamics.point, *state)):
             raise ValueError(_undefined_effect(dynamics, problem, state))
 
 

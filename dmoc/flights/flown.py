@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, short, whole
+from dmoc.basics.numerics import columns
 from dmoc.basics.quaternions import QUATERNION, rotated, rotation_of, times, turned_by
 from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.configurations.of_problem import configuration_of
@@ -197,7 +198,7 @@ def _flown(problem: TransferProblem, times: np.ndarray, force: np.ndarray, delay
         raise ValueError(f"all propellant burns before the end: the mass falls to {path.mass.min():.3g} kg")
     momentum = dynamics.momentum(times[0], position, speed, problem.mass).full().ravel()
     q, p = rollout(dynamics, path, problem.start_time, position, momentum)
-    v = dynamics.velocity(ends[None], q.T, p.T, path.mass[None, :: scheme(ORDER).degree]).full().T
+    v = columns(dynamics.velocity, ends, q.T, p.T, path.mass[:: scheme(ORDER).degree])[0].T
     at = np.argmin(np.abs(ends[:, None] - seen), axis=0)
     made = configuration.coordinates
     q, v = q[at], v[at]

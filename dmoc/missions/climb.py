@@ -37,6 +37,8 @@ MOST_TRYING = 200
 ACCURATE, MOST_MENDED = 1e-5, 3
 # Near to the answer Ipopt is asked for this [-]: at limits the barrier leaves an error of that size.
 SHARP = 1e-12
+# That is near the rounding of the rows: three iterations without a gain end a run that has no barrier left.
+ENDING = {"ipopt.tol": SHARP, "ipopt.acceptable_iter": 3, "ipopt.acceptable_compl_inf_tol": 10 * SHARP}
 # There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
 STAYING = 1.0
 # Where the cost hardly depends on where legs end the path stays nearer: Ipopt would else leave the valley.
@@ -96,9 +98,9 @@ class Climb:
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
         if self.sharp:
-            limits["ipopt.tol"] = SHARP
+            limits |= ENDING
         if near is not None:
-            limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], "ipopt.tol": SHARP}
+            limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], **ENDING}
             limits["ipopt.theta_max_fact"] = STAYING if self.valley is None else VALLEY
         built = time.perf_counter() - begun
         answer = program.solve(path, limits, self.options, watch, carried, self.compiled)

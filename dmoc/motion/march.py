@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
+from dmoc.basics.numerics import columns
 from dmoc.basics.plain import Brief
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
@@ -115,8 +116,8 @@ def simulate(
     mass = path.mass[:: scheme(path.order).degree]
     momentum = dynamics.momentum(time[0], position, velocity, mass[0])
     q, p = rollout(dynamics, path, problem.start_time, position, np.array(momentum).ravel(), compensated)
-    v = np.array(dynamics.velocity(time[None], q.T, p.T, mass[None])).T
-    energy = np.array(dynamics.energy(time[None], q.T, v.T, mass[None])).ravel()
+    v = columns(dynamics.velocity, time, q.T, p.T, mass)[0].T
+    energy = columns(dynamics.energy, time, q.T, v.T, mass)[0].ravel()
     made = dynamics.configuration.coordinates
     trajectory = Trajectory(time, q[:, made.places], v[:, made.speeds], p[:, made.speeds], mass, energy)
     if made.turns:
@@ -263,5 +264,4 @@ def force_of(dynamics: Dynamics, path: DiscretePath) -> np.ndarray:
 
 def wrench_of(dynamics: Dynamics, position: np.ndarray, control: np.ndarray) -> np.ndarray:
     """Force [N] and torque [N m] of controls at positions, one row each."""
-    found = dynamics.wrench(position.T, control.T)
-    return np.array(found).T.reshape(len(control), dynamics.freedom)
+    return columns(dynamics.wrench, position.T, control.T)[0].T

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.numerics import columns
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
@@ -26,7 +27,7 @@ def end_momenta(
     and, at the last node of all, the momentum that arrives there. `momenta` are the `legendre_momenta` if
     they are known.
     """
-    n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
+    ends = slice(None, None, scheme(path.order).degree)
     if momenta is None:
         momenta = legendre_momenta(dynamics, path, start_time)
     p = along_path(dynamics, path.position[ends], np.concatenate([-momenta[0], momenta[-1][-1:]]))
@@ -34,13 +35,14 @@ def end_momenta(
         return p, p.copy()
     times = start_time + path.duration * path.mesh
     p = without_reactions(dynamics, times, path.position[ends], path.mass[ends], p)
-    v = dynamics.velocity(times[None], path.position[ends].T, p.T, path.mass[ends][None])
-    return p, np.array(v).T.reshape(-1, n)
+    return p, columns(dynamics.velocity, times, path.position[ends].T, p.T, path.mass[ends])[0].T
 
 
-def along_path(dynamics: Dynamics, position: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def along_path(dynamics: Dynamics, position: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Z(q)' of columns of the size of q, one row a place: what moves the body and not its constraint."""
-    return dynamics.to_freedom(position.T, columns.T).full().T if dynamics.configuration.surplus else columns
+    if not dynamics.configuration.surplus:
+        return rows
+    return columns(dynamics.to_freedom, position.T, rows.T)[0].T
 
 
 def without_reactions(
@@ -49,12 +51,14 @@ def without_reactions(
     """Momenta in the independent velocities, one row a place, without what the reactions of links take up."""
     if not dynamics.configuration.joined:
         return momenta
-    return dynamics.tangential(times[None], position.T, mass[None], momenta.T).full().T
+    return columns(dynamics.tangential, times, position.T, mass, momenta.T)[0].T
 
 
 def velocity_along(dynamics: Dynamics, position: np.ndarray, rates: np.ndarray) -> np.ndarray:
     """dq/dt = Z(q) w of places and independent velocities, one row each."""
-    return dynamics.to_slopes(position.T, rates.T).full().T if dynamics.configuration.surplus else rates
+    if not dynamics.configuration.surplus:
+        return rates
+    return columns(dynamics.to_slopes, position.T, rates.T)[0].T
 
 
 def rates_along(dynamics: Dynamics, position: np.ndarray, slopes: np.ndarray) -> np.ndarray:
@@ -68,8 +72,8 @@ def rates_along(dynamics: Dynamics, position: np.ndarray, slopes: np.ndarray) ->
 
 def legendre_momenta(dynamics: Dynamics, path: DiscretePath, start_time: float) -> np.ndarray:
     """P_0 .. P_s of every step of a path [m/s], shape (s+1, steps, axes)."""
-    momenta = legendre_function(dynamics, path.order, path.hold)(*_given(path, start_time))
-    return np.array([np.array(momentum).T.reshape(len(path.mesh) - 1, -1) for momentum in momenta])
+    momenta = columns(legendre_function(dynamics, path.order, path.hold), *_given(path, start_time))
+    return np.array([momentum.T for momentum in momenta])
 
 
 def node_velocities(path: DiscretePath, ends: np.ndarray) -> np.ndarray:
@@ -96,7 +100,7 @@ def step_matrices(dynamics: Dynamics, path: DiscretePath, start_time: float) -> 
     given = _given(path, start_time)
     if dynamics.configuration.joined:
         given = (*given, _impulses(dynamics, path))
-    slopes = np.array(function(*given)).reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
+    slopes = columns(function, *given)[0].reshape(n * (s + 1), steps, -1).transpose(1, 0, 2)
     if dynamics.configuration.joined:
         slopes = _between_links(dynamics, path, slopes)
         n -= dynamics.configuration.joined
@@ -177,7 +181,7 @@ def link_bases(dynamics: Dynamics, position: np.ndarray, mass: float) -> np.ndar
     is turned as little as can be from the one before, so that matrices from one to the next compare.
     """
     held, root = dynamics.configuration.joined, inertia_root(dynamics, position[0], mass)
-    bars = dynamics.bars(position.T).full().reshape(held, len(position), -1).transpose(1, 2, 0)
+    bars = columns(dynamics.bars, position.T)[0].reshape(held, len(position), -1).transpose(1, 2, 0)
     bases = np.linalg.qr(np.linalg.solve(root, bars), mode="complete")[0][:, :, held:]
     for before, basis in pairwise(bases):
         left, _, right = np.linalg.svd(basis.T @ before)
@@ -237,7 +241,8 @@ def flow_between_links(
     turning = ca.jacobian(body.opening(q, w), q) @ body.tangent(q)
     both = ca.Function("bent", [q, w], [ca.densify(turning), ca.densify(body.bars(q))])
     bending, bars = (
-        part.full().reshape(held, len(position), n).transpose(1, 0, 2) for part in both(position.T, velocity.T)
+        part.reshape(held, len(position), n).transpose(1, 0, 2)
+        for part in columns(both, position.T, velocity.T)
     )
     basis, root = link_bases(dynamics, position, mass), inertia_root(dynamics, position[0], mass)
     inertia = root @ root.T

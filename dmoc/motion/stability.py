@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.basics.quaternions import angle_between
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -133,9 +134,12 @@ def _radius_of_flow(
     controls = path.control
     if path.hold:
         controls = controls[np.minimum(np.arange(len(times)) // rule.degree, len(controls) - 1)]
-    given = times[None], path.position.T, rates.T, path.mass[None], controls.T
-    stacked = np.array(dynamics.linearised_under_thrust(*given))
-    flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
+    given = times, path.position.T, rates.T, path.mass, controls.T
+    flow = (
+        columns(dynamics.linearised_under_thrust, *given)[0]
+        .reshape(2 * n, len(times), 2 * n)
+        .transpose(1, 0, 2)
+    )
     flow = flow_between_links(dynamics, path.position, rates, path.mass[0], flow)
     one, whole = np.eye(flow.shape[1]), np.eye(flow.shape[1])
     for first, last in pairwise(at):
@@ -173,7 +177,7 @@ def flow_matrices(
     n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
     function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh
-    stacked = np.array(function(times[None], path.position[ends].T, velocity.T, path.mass[ends][None]))
+    stacked = columns(function, times, path.position[ends].T, velocity.T, path.mass[ends])[0]
     flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
     if dynamics.configuration.joined:
         flow = flow_between_links(dynamics, path.position[ends], velocity, path.mass[0], flow)

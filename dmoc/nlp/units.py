@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.guess.coast import held_up, turning_torque
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
@@ -162,7 +163,7 @@ def _costs_along(problem: TransferProblem, guess: DiscretePath, *instead: np.nda
     controls = [some_controls, *(np.broadcast_to(one, some_controls.shape) for one in instead)]
     along = [times[None], guess.place[some].T, velocity.T, guess.mass[some][None]]
     t, q, v, m = (np.tile(values, (1, len(controls))) for values in along)
-    rates = np.array(rate(t, q, v, np.concatenate(controls).T, m)).reshape(len(controls), -1)
+    rates = columns(rate, t, q, v, np.concatenate(controls).T, m)[0].reshape(len(controls), -1)
     last = guess.goal_velocity[guess.coordinates.speeds]
     end = float(terminal(times[-1], guess.place[-1], last, guess.mass[-1]))
     return [float(np.trapezoid(row, times)) + end for row in rates]

@@ -147,7 +147,7 @@ def motion_object(trajectory: Trajectory, problem: Any, coast: bool) -> dict[str
 
 def energy_change(trajectory: Trajectory, problem: Any, coast: bool) -> tuple[float, bool]:
     """The largest change of the energy [J/kg], and whether any is an error of the scheme: nothing does work."""
-    from dmoc.effects import Conservative
+    from dmoc.effects.base import Conservative
 
     energy = trajectory.energy
     kept = coast and all(isinstance(effect, Conservative) for effect in problem.effects)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.numerics import columns
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
@@ -151,7 +152,7 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
     now = states[:-1]
     at = step_nodes(steps, rule)
     h = path.duration * np.diff(path.mesh)
-    origin, march = path.position[0], step_map(dynamics, fine, path.hold).map(steps)
+    origin, step = path.position[0], step_map(dynamics, fine, path.hold)
     for half in (0, 1):
         fractions = 0.5 * (half + fine.points)
         # In memory the controls of one step stand together: the axis changes fastest, then the node, then the
@@ -163,8 +164,8 @@ def local_errors(dynamics: Dynamics, path: DiscretePath, start_time: float) -> n
         mass = rule.values_at(fractions) @ path.mass[at]
         times = start_time + path.duration * path.mesh[:-1] + 0.5 * half * h
         q, p = (now[:, :n] - origin).T, now[:, n:].T
-        moves = march(q, p, mass, control, times[None], 0.5 * h[None], origin)
-        now = now + np.array(np.vstack([np.array(moves[0]), np.array(moves[1])])).T
+        moves = columns(step, q, p, mass, control, times, 0.5 * h, origin)
+        now = now + np.vstack(moves[:2]).T
     # The spin of a body is judged by its largest along the path.
     spin = np.abs(momentum).max() or 1.0
     momenta = np.where(path.coordinates.speeds, scales.speed, spin)

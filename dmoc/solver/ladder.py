@@ -26,7 +26,7 @@ from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded, settled, told
-from dmoc.rungs.tube import around, in_tube, led, out_of_tube
+from dmoc.rungs.tube import FROM_HALFWAY, HALFWAY, around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
@@ -230,9 +230,10 @@ class Ladder:
         if is_curved(problem, guess):
             return self._attempt(guess, problem, limits)
         near = in_tube(problem, guess)
-        if near is not None and (tubed := self._attempt(guess, near, limits)).solved:
-            guess = out_of_tube(tubed.path)
-        here = partial(self._attempt, problem=problem, limits=barrier_from(problem, guess) | limits)
+        onward = barrier_from(problem, guess) | limits
+        if near is not None and (tubed := self._attempt(guess, near, HALFWAY | limits)).solved:
+            guess, onward = out_of_tube(tubed.path), FROM_HALFWAY | limits
+        here = partial(self._attempt, problem=problem, limits=onward)
         return led(here(guess), self.ask, problem, guess, here)
 
     def _attempt(self, guess: DiscretePath, problem: TransferProblem, *args: Any, **how: Any) -> Rung:

@@ -37,8 +37,12 @@ def solve(
     progress: Progress | None = None,
     compiled: bool = False,
     time_limit: float | None = None,
+    sharp: bool = True,
 ) -> Solution:
-    """Solve a transfer problem, coarse to fine: `dmoc.solve` says what the arguments are."""
+    """Solve a transfer problem, coarse to fine: `dmoc.solve` says what the arguments are.
+
+    If not `sharp`, |F| stays rounded at zero as the problem says, however much that costs.
+    """
     of_kind("problem", problem, TransferProblem)
     check_numerics(order, steps, tol, hold, options, progress, time_limit)
     problem = followed(problem, problem.guess if guess is None else guess)
@@ -50,10 +54,10 @@ def solve(
     )
     own = problem.guess if guess is None else guess
     with ladder.interrupt:
-        solution = _solved(ladder, order, steps, tol, hold, mesh, guess)
+        solution = _solved(ladder, order, steps, tol, hold, mesh, guess, sharp=sharp)
 
         def again(paths: list[DiscretePath]) -> Solution | None:
-            other = _solved(ladder, order, steps, tol, hold, mesh, *paths)
+            other = _solved(ladder, order, steps, tol, hold, mesh, *paths, sharp=sharp)
             return other if other.optimal else None
 
         if solution.optimal:
@@ -75,6 +79,8 @@ def _solved(
     hold: bool,
     mesh: Any,
     guess: Any,
+    *,
+    sharp: bool = True,
 ) -> Solution:
     problem = ladder.problem
     # To an orbit as a whole, durations hardly differ in cost: from a long one the refinement to a tolerance
@@ -101,7 +107,7 @@ def _solved(
         if is_open:
             rung = onto_goal(ladder, rung, first, given, order, pinned)
             rung = onto_price(ladder, rung, pinned)
-        return onto_magnitude(ladder, rung)
+        return onto_magnitude(ladder, rung) if sharp else rung
 
     rung = mended(rung)
     if guess is None and mesh is None:

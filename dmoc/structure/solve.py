@@ -28,9 +28,12 @@ from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
-# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, and in the second one:
-# where the fuel hardly depends on where it burns, a wide rounding hides short burns.
-ROUNDED, LESS_ROUNDED = 1e-3, 1e-4
+# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, over the second one
+# if an arc is hardly there, over the third in a second coarse answer: where the fuel hardly depends on
+# where it burns, a wide rounding hides short burns.
+WIDE, ROUNDED, LESS_ROUNDED = 1e-2, 1e-3, 1e-4
+# An arc is clearly there if it is longer than so many times the way from one node to the next [-].
+CLEAR = 3.0
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
 COARSE_STEPS = {2: 60, 4: 30}
 # A second coarse answer has so many times the steps.
@@ -83,6 +86,9 @@ def solve_by_structure(
     if not can_be_parted(problem):
         return None
     coarse = coarse_answer(problem, order, steps, **more)
+    if coarse.success and not _is_clear(coarse):
+        again = coarse_answer(problem, coarse.order, coarse.steps, ROUNDED, **more | {"guess": coarse.path})
+        coarse = replace(again, ladder=(*coarse.ladder, *again.ladder))
     if not coarse.success:
         return coarse if coarse.status in ENDED else None
     found = _by_arcs(problem, coarse, tol, more)
@@ -174,8 +180,16 @@ def has_switches(problem: TransferProblem) -> bool:
     return (bool(problem.constraints) or is_switched(problem)) and can_be_parted(problem)
 
 
+def _is_clear(coarse: Solution) -> bool:
+    """Whether a coarse answer shows its arcs well: |F| is not rounded, or none of them is short."""
+    if coarse.require_problem().actuator.smoothing is None:
+        return True
+    shortest = np.diff([0.0, *(arc.end for arc in arcs_of(coarse))]).min()
+    return bool(shortest * (len(coarse.path.fractions) - 1) > CLEAR)
+
+
 def coarse_answer(
-    problem: TransferProblem, order: int | None, steps: int | None, rounded: float = ROUNDED, **more: Any
+    problem: TransferProblem, order: int | None, steps: int | None, rounded: float = WIDE, **more: Any
 ) -> Solution:
     """An answer that is good enough to see the arcs in, |F| `rounded` at zero over that part of its limit."""
     engine: Any = problem.actuator
@@ -188,7 +202,7 @@ def coarse_answer(
             # On a singular arc forces of order 2 do not chatter.
             order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
             steps = COARSE_STEPS[order]
-    return solve(problem, order, steps, **more)
+    return solve(problem, order, steps, sharp=False, **more)
 
 
 def told(arcs: Sequence[Arc], found: MissionSolution) -> str:

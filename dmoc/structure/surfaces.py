@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.basics.numerics import cubic_spline
+from dmoc.basics.numerics import columns, cubic_spline
 from dmoc.effects.base import Body
 from dmoc.legs.events import Event, Instant, Passed
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
@@ -92,7 +92,7 @@ def room(
     gap, limit = remembered(lambda: _gap(constraint, surface, size), "gap", constraint, surface, size)
     begin = problem.start_time if begin is None else begin
     times, masses = begin + path.duration * at, np.interp(at, path.fractions, path.mass)
-    values = gap(times[None], places.T, masses[None]).full().ravel()
+    values = columns(gap, times, places.T, masses)[0].ravel()
     return (limit - values) * (1 if surface.upper else -1)
 
 

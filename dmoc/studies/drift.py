@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, of_kind, whole
+from dmoc.basics.numerics import columns
 from dmoc.effects.gravity import PointGravity
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
@@ -246,14 +247,14 @@ def _adaptive(
 
 
 def _momenta(dynamics: Dynamics, t: np.ndarray, q: np.ndarray, v: np.ndarray, mass: float) -> np.ndarray:
-    return dynamics.momentum(t[None], q.T, v.T, mass).full().T
+    return columns(dynamics.momentum, t, q.T, v.T, mass)[0].T
 
 
 def _energy_error(
     dynamics: Dynamics, problem: TransferProblem, t: np.ndarray, q: np.ndarray, p: np.ndarray
 ) -> np.ndarray:
-    v = dynamics.velocity(t[None], q.T, p.T, problem.mass)
-    energy = dynamics.energy(t[None], q.T, v, problem.mass).full().ravel()
+    v = columns(dynamics.velocity, t, q.T, p.T, problem.mass)[0]
+    energy = columns(dynamics.energy, t, q.T, v, problem.mass)[0].ravel()
     return np.abs(energy - energy[0]) / (abs(energy[0]) or 1.0)
 
 

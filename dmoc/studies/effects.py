@@ -10,16 +10,12 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.docstrings import documented
-from dmoc.effects import (
-    J2,
-    ConicalShadow,
-    Drag,
-    Effect,
-    ExponentialAtmosphere,
-    RadiationPressure,
-    ThirdBody,
-    circular_motion,
-)
+from dmoc.effects.atmosphere import Drag, ExponentialAtmosphere
+from dmoc.effects.base import Effect
+from dmoc.effects.gravity import J2
+from dmoc.effects.motion import circular_motion
+from dmoc.effects.radiation import ConicalShadow, RadiationPressure
+from dmoc.effects.third_body import ThirdBody
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import end_momenta

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import short
+from dmoc.basics.numerics import columns
 from dmoc.motion import march
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -132,15 +133,15 @@ def _flight(dynamics: Dynamics, leg: Any, state: tuple) -> tuple[Trajectory, tup
     masses = path.mass[:: scheme(path.order).degree]
     momentum = np.array(dynamics.momentum(begin, q, v, mass)).ravel()
     places, momenta = rollout(dynamics, path, begin, q, momentum)
-    speeds = np.array(dynamics.velocity(times[None], places.T, momenta.T, masses[None])).T
+    speeds = columns(dynamics.velocity, times, places.T, momenta.T, masses)[0].T
     return _told(dynamics, times, places, speeds, masses), (places[-1], speeds[-1])
 
 
 def _told(dynamics: Dynamics, times: np.ndarray, q: np.ndarray, v: np.ndarray, mass: np.ndarray) -> Trajectory:
     """States as a Trajectory, one row an instant."""
     made = dynamics.configuration.coordinates
-    p = np.array(dynamics.momentum(times[None], q.T, v.T, mass[None])).T
-    energy = np.array(dynamics.energy(times[None], q.T, v.T, mass[None])).ravel()
+    p = columns(dynamics.momentum, times, q.T, v.T, mass)[0].T
+    energy = columns(dynamics.energy, times, q.T, v.T, mass)[0].ravel()
     found = Trajectory(times, q[:, made.places], v[:, made.speeds], p[:, made.speeds], mass, energy)
     if made.turns:
         attitude = np.hstack([q[:, at] for at in made.quaternions])

@@ -23,7 +23,7 @@ from dmoc import (
     transcribe,
     worth,
 )
-from dmoc.effects import Conservative
+from dmoc.effects.base import Conservative
 from dmoc.nlp.stencils import stencils_of
 
 
