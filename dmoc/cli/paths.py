@@ -55,6 +55,8 @@ def simulate(
         told = []
         for body, one in zip(problem.names, problem.members, strict=True):
             written = _write(flights[body], one, _of_body(out, body), _of_body(plot, body), dark)
+            if not as_json:
+                print(f"{body}:")
             told.append(_told(flights[body], one, written, known is None, as_json))
         if as_json:
             from dmoc.reports.as_json import as_text

@@ -28,6 +28,7 @@ from dmoc.planners import planner as export_solver
 from dmoc.planners import residual as export_residual
 from dmoc.planners import sensitive
 from dmoc.planners.mission import MissionPlanner
+from dmoc.planners.phased import PhasedPlanner
 from dmoc.planners.planner import Planner
 from dmoc.planners.team import TeamPlanner
 from dmoc.planners.terms import Exported
@@ -125,16 +126,12 @@ def export(
     kind: Any = Mission if hasattr(problem, "joints") else TransferProblem
     kind = Team if hasattr(problem, "together") else kind
     of_kind("problem", problem, kind)
-    if getattr(problem, "phased", False):
-        raise ValueError(
-            "a team of missions of several legs is not exported; export the missions of its bodies one by one, "
-            "or a team of transfers"
-        )
     if problem.objective.learns:
         raise ValueError("a plan with Information has no exported functions; export it with another objective")
     hold, c = flag("hold", hold), flag("c", c)
     target = _checked_folder(as_path(folder))
-    made = {Mission: partial(_of_mission, MissionPlanner), Team: partial(_of_mission, TeamPlanner)}
+    of_team = PhasedPlanner if getattr(problem, "phased", False) else TeamPlanner
+    made = {Mission: partial(_of_mission, MissionPlanner), Team: partial(_of_mission, of_team)}
     made_of = made.get(kind, _of_transfer)
     functions, count, about, words, write = made_of(problem, (order, steps, hold, guess), options, c)
     with _whole_folder(target) as work:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from dmoc.planners.functions import Scene
 from dmoc.planners.mission import MissionPlanner
 from dmoc.planners.terms import TERMS
+
+# The mass at the start, also of a body by its name, among the numbers of a mission or a team.
+MASS = re.compile(r"(^|_)(?<!dry_)mass$")
 
 README = """\
 # Functions of {name}
@@ -109,6 +114,15 @@ BODIES = {
     "fixed": "the distances that bodies keep, and the mesh",
 }
 
+PHASES = {
+    "others": "each joint, and of what holds between bodies",
+    "between": """All bodies have one clock, which is cut into phases where some body
+has a joint, in the order that the guess has; legs of a body follow each other. What happens between them, such
+as an impulse, stands in the plan: add it to the velocity before the next rollout.""",
+    "fixed": """the order of joints, what events are made of, the distances that
+bodies keep, and the meshes""",
+}
+
 MISSION_CODE = """
 C: `c/functions.c` needs nothing but the mathematical library; `c/{kind}.h` documents it.
 """
@@ -116,8 +130,8 @@ C: `c/functions.c` needs nothing but the mathematical library; `c/{kind}.h` docu
 
 def mission_readme(planner: MissionPlanner, c: bool) -> str:
     """The text for a mission or a team, with or without C code."""
-    alone = planner.stretch == "leg"
-    mass = "mass" if alone else f"{planner.names[0]}_mass"
+    mass = next(name for name in planner.numbers.names if MASS.search(name))
+    words = {"mission": JOINTS, "team": BODIES if planner.stretch == "body" else PHASES}
     return MISSION.format(
         name=planner.mission.name,
         legs=", ".join(f"`{name}`" for name in planner.names),
@@ -127,5 +141,5 @@ def mission_readme(planner: MissionPlanner, c: bool) -> str:
         mass=mass,
         blank=" " * max(21 - len(mass), 2),
         code=MISSION_CODE.format(kind=planner.kind) if c else "",
-        **(JOINTS if alone else BODIES),
+        **words[planner.kind],
     )

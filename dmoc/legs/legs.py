@@ -26,6 +26,8 @@ class Leg(Named):
         What acts on the body, and the limits on its way, in this leg.
     actuator : Actuator, optional
         What pushes it in this leg.
+    objective : Objective, optional
+        What this leg adds to the objective of the mission, in the unit of that, such as `2.0 * Effort()`.
     order, steps : int, optional
         Order of the scheme and number of steps of this leg.
     name : str
@@ -43,6 +45,7 @@ class Leg(Named):
     steps: int | None = None
     name: str = ""
     control_degree: int | None = None
+    objective: Any = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from dmoc.basics.arguments import short
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.objectives import Objective
 
@@ -52,3 +53,26 @@ class Share(Objective):
 
     def words(self) -> str:
         return self.whole.words()
+
+
+def share_of(leg: Any, whole: Objective, actuator: Actuator) -> Share:
+    """The share of a leg in the objective of a mission, whose controls have the units of an actuator.
+
+    Raises
+    ------
+    ValueError
+        If the leg's own objective cannot be added to that of the mission.
+    """
+    own = leg.objective
+    if own is None:
+        return Share(whole)
+    if not isinstance(own, Objective):
+        raise ValueError(f"objective must be a dmoc.Objective; got {short(own)}")
+    facts = [(one.unit_with(actuator), "most" if one.sense < 0 else "least") for one in (own, whole)]
+    if facts[0] != facts[1]:
+        told = [f"{sought} of a number [{unit or '1'}]" for unit, sought in facts]
+        raise ValueError(
+            f"its own objective seeks the {told[0]} and that of the mission the {told[1]}, and a sum has one "
+            "unit; give the leg an objective of that kind"
+        )
+    return Share(own)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,23 +18,45 @@ from dmoc.ipopt.run import STATUSES, Answer
 from dmoc.missions.solution import Kick, MissionSolution
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, part_solution
-from dmoc.rungs.rung import cut_short
+from dmoc.rungs.rung import cut_short, unmet
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.mission import Mission
+from dmoc.scene.problem import TransferProblem
+
+# What an answer of Ipopt is.
+LOCAL = "a local optimum"
 
 
 def answered(
     climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
 ) -> MissionSolution:
     """The answer of an attempt as a MissionSolution; that of the last mesh solved if the time was over."""
-    if attempt.answer.status == "stopped" and climb.interrupt.late:
-        # Where arcs were added since, the last mission that was solved had other legs.
-        held = climb.held
-        same = held and len(held.path.legs) == len(climb.mission.stretches)
-        attempt = (held if same else attempt).out_of_time()
-        found = _answered(climb, attempt, error, True, tol)
-        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[arg-type, return-value]
-    return _answered(climb, attempt, error, met, tol)
+    return in_time(_answered, climb, attempt, error, met, tol)
+
+
+def in_time(make: Callable, climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> Any:
+    """What `make` makes of an attempt or, if the time was over in it, of the last one that was solved."""
+    if attempt.answer.status != "stopped" or not climb.interrupt.late:
+        return make(climb, attempt, error, met, tol)
+    # Where legs were added since, the last one that was solved had others.
+    held = climb.held
+    same = held and len(held.path.legs) == len(climb.mission.stretches)
+    attempt = (held if same else attempt).out_of_time()
+    return cut_short(make(climb, attempt, error, True, tol), climb.interrupt.seconds, attempt.solved)
+
+
+def outcome_of(
+    climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None, broken: str = ""
+) -> tuple[str, bool, str]:
+    """Status, success and message of an attempt; `broken` says what its answer breaks between nodes."""
+    status = attempt.answer.status
+    if not attempt.solved:
+        return status, False, climb.reason or STATUSES[status].advice
+    if broken:
+        return "infeasible", False, broken
+    if not met:
+        return NOT_MET, False, unmet(None if error is None else error.largest, tol)
+    return status, True, LOCAL
 
 
 def straightened(climb: Any, attempt: Any, most: int) -> Any:
@@ -55,19 +77,12 @@ def straightened(climb: Any, attempt: Any, most: int) -> Any:
 
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> MissionSolution:
     mission, program, answer = climb.mission, attempt.program, attempt.answer
-    path, status = attempt.path, answer.status
+    path = attempt.path
     made = mission_solution(
-        mission, path, costs_of(program, answer.x), attempt.level.objective, status, climb.levels
+        mission, path, costs_of(program, answer.x), attempt.level.objective, answer.status, climb.levels
     )
     steps = ", ".join(str(leg.steps) for leg in made.legs)
-    if status == "solved":
-        message, success = made.message, True
-    else:
-        message, success = climb.reason or STATUSES[status].advice, False
-    if success and not met:
-        status, success = NOT_MET, False
-        reached = "unknown" if error is None else f"{error.largest:.1e}"
-        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    status, success, message = outcome_of(climb, attempt, error, met, tol)
     return replace(
         made,
         success=success,
@@ -110,7 +125,7 @@ def mission_solution(
         mass,
         status == "solved",
         status,
-        "a local optimum",
+        LOCAL,
         (levels[-1],),
         provenance=about,
     )
@@ -178,11 +193,17 @@ def _impulses(mission: Mission, path: MissionPath, legs: Sequence[Solution]) -> 
 
 
 def _warnings(mission: Mission, legs: Sequence[Solution]) -> tuple[str, ...]:
+    parts = zip(mission.leg_names, mission.stretches, [leg.duration for leg in legs], strict=True)
+    return (*at_limits(parts), *cautions_of(mission))
+
+
+def at_limits(parts: Iterable[tuple[str, TransferProblem, float]], kind: str = "duration") -> list[str]:
+    """What ends on a limit of its duration, in words: names, problems and durations [s] of parts."""
     found = []
-    for name, leg, stretch in zip(mission.leg_names, legs, mission.stretches, strict=True):
-        bound = stretch.limit_of_duration(leg.duration)
+    for name, problem, lasts in parts:
+        bound = problem.limit_of_duration(lasts)
         if bound is not None:
             other = "shorter" if bound == "shortest" else "longer"
-            ends = f"{name} ends on its {bound} duration of {lasting(leg.duration, 6)}"
+            ends = f"{name} ends on its {bound} {kind} of {lasting(lasts, 6)}"
             found.append(f"{ends}: a {other} one may cost less")
-    return (*found, *cautions_of(mission))
+    return found

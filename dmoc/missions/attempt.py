@@ -14,6 +14,8 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.nlp.units import outgrown
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Level
+from dmoc.rungs.rung import rounded
+from dmoc.scene.problem import TransferProblem
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,22 @@ class Attempt:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
         return max(float(each.sum()) for each in self.errors)
 
+    def to_cut(self, accurate: float) -> list[np.ndarray]:
+        """The errors by which steps are cut: all alike where what is left is in no step more than in others."""
+        few = self.largest_error <= accurate
+        return [np.ones_like(each) for each in self.errors] if few else self.errors
+
     def out_of_time(self) -> Attempt:
         """The attempt when the time is over: what did not get there has failed, nobody interrupted it."""
         return self if self.solved else replace(self, answer=replace(self.answer, status="failed"))
+
+
+def change(coarse: Attempt, fine: Attempt) -> float:
+    """What the objective changes from mesh to mesh, of itself [-]."""
+    scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
+    return abs(fine.level.objective - coarse.level.objective) / scale
+
+
+def rounded_to(problem: TransferProblem, rounding: float | None) -> TransferProblem:
+    """A leg with |F| rounded at zero over that part of its limit, if it is rounded at all."""
+    return problem if problem.actuator.smoothing is None else rounded(problem, rounding)

@@ -15,7 +15,7 @@ from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Interrupt, Watch
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
-from dmoc.missions.attempt import Attempt
+from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.sharper import onto_magnitude
@@ -25,9 +25,8 @@ from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import left_after
 from dmoc.results.facts import Error, Level
-from dmoc.rungs.rung import rounded, settled
+from dmoc.rungs.rung import settled
 from dmoc.scene.mission import Mission
-from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import UNEXPLAINED
 from dmoc.solver.solve import check_numerics
 
@@ -56,8 +55,11 @@ OTHER_DURATIONS = (0.5, 2.0, 0.25, 4.0)
 class Climb:
     """The attempts at one mission, in their order."""
 
-    # What sees it as Ipopt does.
+    # What sees it as Ipopt does, and what makes a solution of an attempt.
     program: Any = MissionProgram
+    answered: Any = answered
+    # Order, steps, whether forces are held, and the guess, as they were asked for.
+    asked: tuple[int | None, int | None, bool, Any] = (None, None, False, None)
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
@@ -72,6 +74,41 @@ class Climb:
         self.held: Attempt | None = None
         # What is in the way, where no attempt succeeded, and what another start led to.
         self.reason = self.told = ""
+
+    def solve(self, path: MissionPath, tol: float | None, given: bool) -> Any:
+        """From a path to the answer; on its meshes alone if these are given and there is no tolerance."""
+        with self.interrupt:
+            first = self.first(path)
+            if not first.solved:
+                return self.answered(first)
+            first = self.prepared(first, path)
+            if given and tol is None:
+                return self.answered(first)
+            return self.answered(*self.finished(first, path, tol), tol)
+
+    def first(self, path: MissionPath) -> Attempt:
+        """The first answer or, where none is found, an attempt that failed and why."""
+        first = self.attempt(path) if path.warm else self.from_guess(path)
+        if not (first.solved or path.warm or self.interrupt.seen):
+            first = self.otherwise(first, path)
+        return first if first.solved else self.explained(path, first)
+
+    def otherwise(self, attempt: Attempt, path: Any) -> Attempt:
+        """What else is tried where a guess leads to no answer."""
+        return attempt
+
+    def prepared(self, first: Attempt, path: Any) -> Attempt:
+        """The first answer with parts dropped at the best time, no thrust reversed, and graded steps."""
+        order, steps, hold, guess = self.asked
+        if not path.warm and guess is None:
+            first = with_best_drops(self, first, lambda one: first_path(one, order, steps, hold, None))
+        first = straightened(self, first, MOST_TRYING)
+        first = self.regraded(first, meshes_along(self.mission, first.path, order, steps))
+        return onto_magnitude(self, first)
+
+    def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
+        """The answer on fine meshes, its error, and whether that is what was asked for."""
+        return self.refined(first, tol)
 
     def attempt(self, path: MissionPath, *args: Any, **how: Any) -> Attempt:
         """Solve on the meshes of a path, and again where the answer hardly takes the force of its units."""
@@ -93,7 +130,7 @@ class Climb:
         with which parameter of the barrier [-].
         """
         begun, mission = time.perf_counter(), self.mission
-        problems = [_rounded(problem, rounding) for problem in mission.stretches]
+        problems = [rounded_to(problem, rounding) for problem in mission.stretches]
         program: MissionProgram = self.program.of(self.mission, problems, path, rounding)
         watch = self._watch(program)
         limits: dict[str, Any] = {} if most is None else {"ipopt.max_iter": most}
@@ -186,21 +223,26 @@ class Climb:
         return again if again.solved else attempt
 
     def refined(
-        self, attempt: Attempt, tol: float | None, accurate: float = ACCURATE, still: float = np.inf
+        self,
+        attempt: Attempt,
+        tol: float | None,
+        accurate: float = ACCURATE,
+        still: float = np.inf,
+        seen: bool = True,
     ) -> tuple[Attempt, Error | None, bool]:
         """The answer on meshes that are fine enough, its estimated error, and whether that meets `tol`.
 
         Without a tolerance the steps of a leg are to err by no more than `accurate` in sum, and the objective
-        by about the part `still` of it.
+        by about the part `still` of it, which is `seen` on one more mesh at least if steps do not show it.
         """
         error: Error | None = None
         changes: list[float] = []
         few = tol is None and np.isinf(still)
         for _ in range(MOST_MENDED if few else MOST_MESHES):
-            rest = left_after(changes) if changes else 0.0
+            rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
-            onto = attempt.path.finer(attempt.errors)
+            onto = attempt.path.finer(attempt.to_cut(accurate if tol is None else tol))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)
@@ -208,7 +250,7 @@ class Climb:
                 return found, error, False
             if not found.solved:
                 break
-            changes.append(_change(attempt, found))
+            changes.append(change(attempt, found))
             attempt = found
             if tol is not None:
                 error = self._error(attempt, changes, attempt.largest_error)
@@ -252,29 +294,5 @@ def solve_mission(
     if mesh is not None:
         raise ValueError("a mission has a mesh for each leg; give steps, or Leg(steps=...)")
     climb = Climb(mission, options, progress, compiled, time_limit)
-    path = first_path(mission, order, steps, hold, guess)
-    with climb.interrupt:
-        first = climb.attempt(path) if path.warm else climb.from_guess(path)
-        if not first.solved:
-            first = climb.explained(path, first)
-        if not first.solved:
-            return answered(climb, first)
-        if not path.warm and guess is None:
-            first = with_best_drops(climb, first, lambda one: first_path(one, order, steps, hold, None))
-        first = straightened(climb, first, MOST_TRYING)
-        first = climb.regraded(first, meshes_along(mission, first.path, order, steps))
-        # Meshes are refined for the problem that the answer is of.
-        first = onto_magnitude(climb, first)
-        if steps is not None and tol is None:
-            return answered(climb, first)
-        return answered(climb, *climb.refined(first, tol), tol)
-
-
-def _change(coarse: Attempt, fine: Attempt) -> float:
-    """What the objective changes from mesh to mesh, of itself [-]."""
-    scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
-    return abs(fine.level.objective - coarse.level.objective) / scale
-
-
-def _rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:
-    return problem if problem.actuator.smoothing is None else rounded(problem, rounding)
+    climb.asked = order, steps, hold, guess
+    return climb.solve(first_path(mission, order, steps, hold, guess), tol, steps is not None)

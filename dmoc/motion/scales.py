@@ -14,6 +14,8 @@ from dmoc.motion.path import DiscretePath
 # A body that turns by less than this counts as turned by it [rad]: the length of its quaternion is met to 1e-10
 # by the optimiser, and errors of that size are no errors of a turn.
 LEAST_TURN = 1e-4
+# A body that moves less than this [m] stands still: its square is no number that divides any more.
+TINY = 1e-100
 
 
 def least_extent(mass: float, inertia: Any) -> float:

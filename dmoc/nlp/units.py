@@ -9,7 +9,7 @@ import numpy as np
 from dmoc.basics.numerics import columns
 from dmoc.guess.coast import held_up, turning_torque
 from dmoc.motion.path import DiscretePath
-from dmoc.motion.scales import LEAST_TURN, least_extent, path_scales
+from dmoc.motion.scales import LEAST_TURN, TINY, least_extent, path_scales
 from dmoc.results.flown_cost import cost_functions
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.problem import TransferProblem
@@ -63,10 +63,10 @@ def units_of(problem: TransferProblem, guess: DiscretePath) -> Units:
     origin = np.where(places, 0.5 * (low + high), 0.0)
     time = guess.duration
     both = np.array([guess.start_velocity, guess.goal_velocity])[:, speeds]
-    extent = guess.diagonal
-    if extent < least_extent(problem.mass, problem.inertia):
-        extent = 0.0
-    length = extent or float(np.abs(both).max(initial=0.0) * time) or 1.0
+    # What rounding leaves of none is none.
+    least = max(least_extent(problem.mass, problem.inertia), TINY)
+    lengths = guess.diagonal, float(np.abs(both).max(initial=0.0) * time)
+    length = next((one for one in lengths if one > least), 1.0)
     change = length / time
     if not problem.effects:
         # Without effects the actuator alone must change the velocities of both ends into the mean one.

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from dmoc.basics.digits import lasting
-from dmoc.ipopt.run import STATUSES
-from dmoc.missions.answer import costs_of, mission_solution, worst_rows
+from dmoc.missions.answer import at_limits, costs_of, in_time, mission_solution, outcome_of, worst_rows
 from dmoc.phases.cuts import phased_cuts
 from dmoc.phases.path import PhasedPath
 from dmoc.phases.solution import PhasedSolution
 from dmoc.phases.timetable import Timetable
 from dmoc.results.facts import Error, Provenance
-from dmoc.results.solution import NOT_MET
-from dmoc.rungs.rung import cut_short
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.teams.answer import in_distances, run_through
 
@@ -22,23 +18,14 @@ def answered(
     climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
 ) -> PhasedSolution:
     """The answer of an attempt as a PhasedSolution; that of the last mesh solved if the time was over."""
-    if attempt.answer.status == "stopped" and climb.interrupt.late:
-        attempt = (climb.held or attempt).out_of_time()
-        found: Any = _answered(climb, attempt, error, True, tol)
-        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
-    return _answered(climb, attempt, error, met, tol)
+    return in_time(_answered, climb, attempt, error, met, tol)
 
 
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> PhasedSolution:
     plan, program, answer = attempt.program.mission, attempt.program, attempt.answer
-    team, path, status, success = plan.team, attempt.path, answer.status, attempt.solved
-    message = "a local optimum" if success else climb.reason or STATUSES[status].advice
-    if success and (broken := run_through(phased_cuts(plan, path))):
-        status, success, message = "infeasible", False, broken
-    if success and not met:
-        status, success = NOT_MET, False
-        reached = "unknown" if error is None else f"{error.largest:.1e}"
-        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    team, path = plan.team, attempt.path
+    broken = run_through(phased_cuts(plan, path)) if attempt.solved else ""
+    status, success, message = outcome_of(climb, attempt, error, met, tol, broken)
     about = Provenance(
         team.name,
         team.parameters,
@@ -91,13 +78,9 @@ def _warnings(plan: Timetable, path: PhasedPath) -> tuple[str, ...]:
     """Legs that end on a limit of their duration as stated, and phases that are as short as may be."""
     found = []
     for name, mission, mine in zip(plan.names, plan.missions, plan.leg_of, strict=True):
-        for i, (leg, word) in enumerate(zip(mission.stretches, mission.leg_names, strict=True)):
-            lasts = float(path.durations[mine == i].sum())
-            bound = leg.limit_of_duration(lasts)
-            if bound is not None:
-                other = "shorter" if bound == "shortest" else "longer"
-                ends = f"{word} of {name} ends on its {bound} duration of {lasting(lasts, 6)}"
-                found.append(f"{ends}: a {other} one may cost less")
+        lasts = [float(path.durations[mine == i].sum()) for i in range(len(mission.plan))]
+        words = [f"{word} of {name}" for word in mission.leg_names]
+        found += at_limits(zip(words, mission.stretches, lasts, strict=True))
     if short := plan.short(path.durations):
         found.append(
             f"joints of two bodies end at one time in phase {short[0] + 1}: another order of them may cost less"

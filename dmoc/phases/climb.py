@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.chains.path import cold
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.climb import Climb
 from dmoc.missions.guess import first_path
@@ -19,6 +20,7 @@ from dmoc.phases.path import PhasedPath
 from dmoc.phases.program import PhasedProgram
 from dmoc.phases.solution import PhasedSolution
 from dmoc.phases.timetable import Timetable
+from dmoc.results.facts import Error
 from dmoc.scene.mission import LEAST_SHARE
 from dmoc.scene.team import Team
 from dmoc.solver.solve import check_numerics
@@ -35,6 +37,14 @@ class PhasedClimb(TeamClimb):
     """The attempts at one team of missions, in their order; `mission` is its timetable."""
 
     program: Any = PhasedProgram
+    answered: Any = answered
+
+    def prepared(self, first: Attempt, path: Any) -> Attempt:
+        return self.reordered(first)
+
+    def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
+        # Other ways round begin on the clock that was found.
+        return super().finished(first, path if path.warm else cold(first.path), tol)
 
     def cut_at_leaps(self, path: Any) -> Any:
         steps = phased_leaps(self.mission, path)
@@ -48,7 +58,7 @@ class PhasedClimb(TeamClimb):
         clock = path.begins[0] + np.append(0.0, np.cumsum(path.durations))
         return on_clock(plan, flown_ways(start), clock, (leg.order, None, leg.hold))
 
-    def from_own_answers(self, attempt: Attempt, path: Any) -> Attempt:
+    def otherwise(self, attempt: Attempt, path: Any) -> Attempt:
         """An answer from what every body would do by itself, if all of them have an answer, bent apart."""
         team, own = self.mission.team, []
         numerics = path.legs[0].order, path.legs[0].hold
@@ -143,22 +153,7 @@ def solve_phased(
         raise ValueError("a team of missions has a mesh for each phase; give steps")
     plan, path = first_phases(team, order, steps, hold, guess)
     climb = PhasedClimb(plan, options, progress, compiled, time_limit)
-    with climb.interrupt:
-        first = climb.attempt(path) if path.warm else climb.from_guess(path)
-        if not (first.solved or path.warm or climb.interrupt.seen):
-            first = climb.from_own_answers(first, path)
-        if not first.solved:
-            first = climb.explained(path, first)
-        if not first.solved:
-            return answered(climb, first)
-        first = climb.reordered(first)
-        if steps is not None and tol is None:
-            return answered(climb, first)
-        found, error, met = climb.refined(first, tol)
-        found = climb.unleapt(found) if met else found
-        if found.solved and not path.warm:
-            found = climb.round_the_other_way(found, found.path)
-        return answered(climb, climb.sharpened(found) if tol is None else found, error, met, tol)
+    return climb.solve(path, tol, steps is not None)
 
 
 def first_phases(

@@ -87,7 +87,7 @@ class MissionPlanner:
     def _taken(self, twin: Mission) -> list[np.ndarray]:
         """Bounds and parameters of a mission that differs in numbers, unchecked."""
         legs = [
-            replace(placed, program=replace(placed.program, problem=_stretch(twin, i)))
+            replace(placed, program=replace(placed.program, problem=stretch_with(twin, i)))
             for i, placed in enumerate(self.program.legs)
         ]
         program = replace(self.program, mission=twin, legs=tuple(legs))
@@ -123,9 +123,9 @@ class MissionPlanner:
             for group in self.program.own[joint.name][0].groups:
                 axes = ", ".join(group.labels)
                 if not group.name.startswith("event"):
-                    found["velocity_before_start"] = (
+                    found[f"velocity_before_{identifier(joint.name)}"] = (
                         len(group.labels),
-                        Term("m/s", f"velocity before what happens at the start: {axes}"),
+                        Term("m/s", f"velocity before what happens at the {joint.name}: {axes}"),
                     )
                     continue
                 i = int(group.name.split()[1])
@@ -233,7 +233,7 @@ def _matrix(values: ca.MX, group: Group, first: int) -> ca.MX:
     return ca.reshape(values[first + group.start : first + group.stop], len(group.labels), group.count)
 
 
-def _stretch(twin: Mission, index: int) -> TransferProblem:
+def stretch_with(twin: Mission, index: int) -> TransferProblem:
     """A leg of a mission that differs in numbers, unchecked."""
     leg, stretch = twin.plan[index], copy.copy(twin.stretches[index])
     values = {

@@ -74,7 +74,9 @@ def _draw_force(axes: Any, solution: MissionSolution, late: float) -> None:
     """The force of every leg that has one, along each axis and its magnitude, and its limits."""
     pushed = [leg for leg in solution.legs if np.abs(leg.force).max(initial=0.0) > 0]
     size, unit = readable(np.concatenate([leg.force for leg in pushed]), "N")
-    for leg in pushed:
+    limits = [None if leg.problem is None else leg.problem.actuator.force_limit() for leg in pushed]
+    strengths = [float(np.linalg.norm(leg.force, axis=1).max()) for leg in pushed]
+    for leg, limit in zip(pushed, limits, strict=True):
         times, force = flown_force(leg)
         if leg.hold:
             times, force = np.repeat(leg.end_times, 2)[1:-1], np.repeat(leg.force, 2, axis=0)
@@ -84,16 +86,12 @@ def _draw_force(axes: Any, solution: MissionSolution, late: float) -> None:
         if solution.dimension > 1:
             total = np.linalg.norm(force, axis=1) / size
             axes.plot(times / late, total, color=DARK, linestyle=(0, (1, 1)), label="$|F|$")
-        _draw_limit(axes, leg, late, size)
+        # A limit that the force comes near in one leg is shown in all legs that have it.
+        near = [strength for strength, other in zip(strengths, limits, strict=True) if other == limit]
+        if limit is not None and limit < 2 * max(near):
+            axes.hlines(limit / size, *leg.end_times[[0, -1]] / late, label="limit", **_flat(LIMIT))
     axes.set_ylabel(f"force [{unit}]")
     axes.set_title("Force of the actuators" + (", held over each step" if pushed[0].hold else ""))
-
-
-def _draw_limit(axes: Any, leg: Solution, late: float, size: float) -> None:
-    """The limit of a leg, while it lasts, where the force comes near it."""
-    limit = None if leg.problem is None else leg.problem.actuator.force_limit()
-    if limit is not None and limit < 2 * np.linalg.norm(leg.force, axis=1).max(initial=0.0):
-        axes.hlines(limit / size, *leg.end_times[[0, -1]] / late, label="limit", **_flat(LIMIT))
 
 
 def _flat(style: dict[str, Any]) -> dict[str, Any]:

@@ -86,8 +86,10 @@ def _draw_paths(axes: Any, solution: TeamSolution, scenery: tuple[Any, Any], bes
     for one, style in zip(solution.members, styles(solution.names), strict=True):
         _mark(axes, _at(one, moments) / size, style["color"])
         if len(joints := _joints(one)):
-            look = {"linestyle": "none", "marker": "D", "markersize": 7, "color": style["color"], "zorder": 6.5}
-            axes.plot(*joints.T / size, label="_joints", **look)
+            # The corners show behind the number of a moment.
+            look = {"linestyle": "none", "marker": "D", "markersize": 12, "zorder": 5.9}
+            look |= {"markerfacecolor": "white", "markeredgecolor": style["color"]}
+            axes.plot(*joints.T / size, label="joint", **look)
     for name, one, style in drawn(solution):
         curve = within_steps(one, one.position)[1] / size
         mark_burns(axes, one, one.position.T / size)

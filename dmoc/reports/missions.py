@@ -26,9 +26,12 @@ def mission_scene(mission: Mission) -> RenderableType:
     rows += [("start time", f"free between {' and '.join(lasting(t, 6) for t in mission.start_bounds)}")] * (
         mission.start_bounds[0] < mission.start_bounds[1]
     )
-    for i, (name, leg) in enumerate(zip(mission.leg_names, mission.stretches, strict=True)):
+    legs = zip(mission.leg_names, mission.stretches, mission.plan, strict=True)
+    for i, (name, leg, stated) in enumerate(legs):
         effects = [effect_words(effect) for effect in leg.effects] or ["no effect: the body is free"]
-        rows.append((name, [_span(leg), leg.actuator.words(), *effects, *(c.words() for c in leg.constraints)]))
+        told = [_span(leg), leg.actuator.words(), *effects, *(c.words() for c in leg.constraints)]
+        own = [] if stated.objective is None else [f"adds its own: {stated.objective.words().rstrip('.')}"]
+        rows.append((name, told + own))
         rows.append((mission.joints[i + 1].name, _joint_words(mission, i + 1)))
     if mission.duration is not None:
         ends = mission.duration if isinstance(mission.duration, tuple) else (mission.duration,)

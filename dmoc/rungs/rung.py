@@ -11,13 +11,13 @@ import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
-from dmoc.ipopt.run import Answer
+from dmoc.ipopt.run import STATUSES, Answer
 from dmoc.meshes.choices import WIDEST_ROUNDING
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.units import outgrown
 from dmoc.results.facts import Level, off_optimum
-from dmoc.results.solution import OUT_OF_TIME, Solution
+from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution
 from dmoc.results.switches import has_linear_controls
 from dmoc.scene.clock import cautions_of
 from dmoc.scene.problem import TransferProblem
@@ -208,6 +208,12 @@ def nowhere_zero(path: DiscretePath, problem: TransferProblem) -> bool:
         return False
     most = engine.bounds(problem.dimension)[1][-1]
     return bool(used.min() > FAR * max(engine.smoothing, WIDEST_ROUNDING) * most)
+
+
+def unmet(error: float | None, tol: float | None) -> str:
+    """That a tolerance is not met, in words; the estimated error may not be known."""
+    reached = "unknown" if error is None else f"{error:.1e}"
+    return f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
 
 
 def cut_short(solution: Solution, seconds: float | None, is_answer: bool) -> Solution:

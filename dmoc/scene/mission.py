@@ -14,7 +14,7 @@ from dmoc.ends.base import Boundary
 from dmoc.legs.ends import Loose
 from dmoc.legs.events import Event, Impulse
 from dmoc.legs.legs import Joint, Leg, checked_sums, span_of, start_times
-from dmoc.legs.objectives import DeltaV, Share
+from dmoc.legs.objectives import DeltaV, share_of
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.forces import FreeForce
@@ -183,22 +183,24 @@ class Mission(Named):
         """Each leg as a transfer between two joints, whose states and masses are open."""
         ends = Loose.like(self._whole.start)
         return tuple(
-            self._of_leg(leg, ends, ends, Share(self.objective), self.duration_of(leg), name)
+            self._of_leg(leg, ends, ends, self.duration_of(leg), name)
             for leg, name in zip(self.plan, self.leg_names, strict=True)
         )
 
     def _of_leg(
-        self, leg: Leg, start: Boundary, goal: Boundary, objective: Objective, duration: Any, name: str
+        self, leg: Leg, start: Boundary, goal: Boundary, duration: Any, name: str, whole: bool = False
     ) -> TransferProblem:
         try:
+            actuator = self.actuator if leg.actuator is None else leg.actuator
+            share = self.objective if whole else share_of(leg, self.objective, actuator)
             return TransferProblem(
                 mass=self.mass,
                 start=start,
                 goal=goal,
                 duration=duration,
                 effects=self.effects if leg.effects is None else leg.effects,
-                actuator=self.actuator if leg.actuator is None else leg.actuator,
-                objective=objective,
+                actuator=actuator,
+                objective=share,
                 constraints=self.constraints if leg.constraints is None else leg.constraints,
                 start_time=self.start_bounds[0],
                 inertia=self.inertia,
@@ -211,11 +213,11 @@ class Mission(Named):
     def alone(self) -> TransferProblem | None:
         """The transfer that a mission of one leg is, without events and choices of its own; else None."""
         leg = self.plan[0]
-        own = leg.order, leg.steps, leg.name or None
-        if len(self.legs) > 1 or self.closes or own != (None, None, None) or isinstance(self.start_time, tuple):
+        own = {leg.order, leg.steps, leg.name or None, leg.objective}
+        if len(self.legs) > 1 or self.closes or own != {None} or isinstance(self.start_time, tuple):
             return None
         span = self.duration_of(leg) if self.duration is None else self.duration
-        whole = self._of_leg(leg, self.start, self.goal, self.objective, span, self.name)
+        whole = self._of_leg(leg, self.start, self.goal, span, self.name, whole=True)
         return replace(whole, guess=self.guess, parameters=self.parameters)
 
     @cached_property
@@ -224,8 +226,7 @@ class Mission(Named):
         goal = Loose.like(self.start) if self.closes else self.goal
         shortest, longest = self.duration_bounds
         span = shortest if shortest == longest else (shortest, longest)
-        share = Share(self.objective)
-        return self._of_leg(self.plan[0], self.start, goal, share, span, self.leg_names[0])
+        return self._of_leg(self.plan[0], self.start, goal, span, self.leg_names[0])
 
     def _complete_ends(self) -> None:
         axes = self.start.dimension or self.goal.dimension
@@ -288,9 +289,7 @@ class Mission(Named):
         self, index: int, start: Boundary, goal: Boundary, start_time: float, duration: float
     ) -> TransferProblem:
         """A transfer between two ends by what acts in a leg, for a guess."""
-        problem = self._of_leg(
-            self.plan[index], start, goal, Share(self.objective), duration, self.leg_names[index]
-        )
+        problem = self._of_leg(self.plan[index], start, goal, duration, self.leg_names[index])
         return replace(problem, start_time=start_time)
 
     def fixed_at(self, index: int, start_time: float, mass: float, duration: float) -> TransferProblem:

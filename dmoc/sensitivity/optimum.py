@@ -53,11 +53,6 @@ class Optimum:
 
         Opened, the constants of effects are parameters of it.
         """
-        if getattr(problem, "phased", False):
-            raise ValueError(
-                "sensitivities are those of a transfer, a mission, or a team of transfers, not of a team of "
-                "missions; solve the team again with other numbers"
-            )
         problem = with_open_effects(problem) if opened else problem
         if hasattr(problem, "plan") or hasattr(problem, "members"):
             return cls._of_mission(solution, problem)
@@ -83,15 +78,26 @@ class Optimum:
         from dmoc.chains.program import MissionProgram
         from dmoc.planners.mission import MissionPlanner, identifiers
 
-        path, names = solution.path, identifiers(mission.leg_names)
-        if hasattr(mission, "members"):
+        path = solution.path
+        program: MissionProgram
+        if getattr(mission, "phased", False):
+            from dmoc.phases.program import PhasedProgram
+            from dmoc.phases.timetable import Timetable
+            from dmoc.planners.phased import numbers_of_phases
+
+            plan = Timetable(mission, path.joints)
+            program = PhasedProgram.of(plan, plan.stretches, path)
+            numbers = numbers_of_phases(program)
+        elif hasattr(mission, "members"):
             from dmoc.teams.program import TeamProgram
 
-            program: MissionProgram = TeamProgram.of(mission, mission.stretches, path)
-            numbers = Numbers(mission, numbers_of_team(mission, names), partial(_of_team, program))
+            program = TeamProgram.of(mission, mission.stretches, path)
+            numbers = Numbers(
+                mission, numbers_of_team(mission, identifiers(mission.leg_names)), partial(_of_team, program)
+            )
         else:
             program = MissionProgram.of(mission, mission.stretches, path)
-            numbers = MissionPlanner(program, path, (), names).numbers
+            numbers = MissionPlanner(program, path, (), identifiers(mission.leg_names)).numbers
         return cls(
             program,
             path,

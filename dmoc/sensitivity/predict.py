@@ -39,7 +39,7 @@ def predict(solution: Any, **changes: Any) -> Any:
 
     Returns
     -------
-    DiscretePath, or MissionPath of a mission, TeamPath of a team
+    DiscretePath, or MissionPath of a mission, TeamPath or PhasedPath of a team
 
     Raises
     ------
@@ -64,6 +64,8 @@ def predict(solution: Any, **changes: Any) -> Any:
     x = np.clip(x, optimum.bounds[0] + lower @ by, optimum.bounds[1] + upper @ by)
     lam_x, lam_g = optimum.lam_x + moved.lam_x[:, 0], optimum.lam_g + moved.lam_g[:, 0]
     answer = Answer(x, lam_x, lam_g, optimum.rows + moved.rows[:, 0], 0.0, "", 0, 0, 0.0)
+    if getattr(solution.problem, "phased", False):
+        return _of_phases(optimum, answer, wanted)
     if hasattr(solution.problem, "members"):
         return _of_team(optimum, answer, wanted)
     if hasattr(solution.problem, "plan"):
@@ -104,6 +106,20 @@ def _of_team(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) ->
         legs.append(_with_stated(placed.program.columns, _with_unit_quaternions(leg), own))
     begins = wanted.get("start_time", np.array(path.begins[:1]))
     return replace(path, legs=tuple(legs), begins=(float(begins[0]),) * len(legs))
+
+
+def _of_phases(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) -> Any:
+    """The paths of a team of missions, whose phases last as is stated where that is no unknown."""
+    plan, path = optimum.program.mission, optimum.program.path(answer)
+    lasts = path.durations
+    for one in optimum.numbers.kept:
+        if one.name in wanted:
+            lasts = lasts + np.nan_to_num(one.changed(wanted[one.name]).known - plan.known)
+    legs = tuple(
+        replace(_with_unit_quaternions(leg), duration=float(lasts[i % plan.count]))
+        for i, leg in enumerate(path.legs)
+    )
+    return replace(path, legs=legs, near=True)
 
 
 def _checked(numbers: list[Number], changes: dict[str, Any]) -> dict[str, np.ndarray]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmoc.ipopt.run import STATUSES
 from dmoc.meshes.cuts import PARTS, SHORTEST, cut, cuts_of
 from dmoc.motion.path import DiscretePath
 from dmoc.results.estimate import (
@@ -21,7 +20,7 @@ from dmoc.results.facts import Error, off_optimum
 from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import corners, has_linear_controls, switches_in_words
-from dmoc.rungs.rung import Rung, at_rest
+from dmoc.rungs.rung import Rung, at_rest, unmet
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.mended import goal_missed
@@ -231,8 +230,7 @@ class Refinement:
         reached = self.best.error.largest
         if reached <= self.tol:
             return solution
-        told = f"the estimated error is {reached:.1e}, you asked for {self.tol:g}; {STATUSES[NOT_MET].advice}"
-        return replace(solution, success=False, status=NOT_MET, message=told)
+        return replace(solution, success=False, status=NOT_MET, message=unmet(reached, self.tol))
 
 
 def _words(problem: TransferProblem, path: DiscretePath, reason: str) -> str:

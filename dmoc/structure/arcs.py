@@ -7,6 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dmoc.basics.digits import lasting
+from dmoc.guess.starting import angle_around
+from dmoc.meshes.choices import first_path
+from dmoc.missions.solution import MissionSolution
 from dmoc.motion.path import DiscretePath
 from dmoc.results.solution import Solution
 from dmoc.results.switches import control_shares
@@ -21,6 +25,10 @@ BURN, COAST, SINGULAR = "burn", "coast", "singular arc"
 ACTS = 1e-5
 # A path follows a limit if that acts over more than this many steps; else it touches it.
 FOLLOWED_STEPS = 2.5
+# Over more revolutions than this there are too many arcs.
+MOST_TURNS = 10
+# An arc is clearly there if it is longer than so many times the way from one node to the next [-].
+CLEAR = 3.0
 # A switch within so many steps from where a limit on the speed is reached or left is there.
 BESIDE = 2.0
 
@@ -51,6 +59,22 @@ def is_switched(problem: TransferProblem) -> bool:
     """Whether the cost is linear in one control with limits, from nothing to full."""
     shares = control_shares(problem, np.zeros((1, problem.controls)))
     return shares.shape[1] == 1 and float(shares[0, 0]) == 0.0
+
+
+def can_be_parted(problem: TransferProblem) -> bool:
+    """Whether arcs can be seen: of one body that does not turn, in few revolutions."""
+    return not (
+        problem.turns
+        or problem.links
+        or any(part.turns_body or part.point for part in problem.constraints)
+        or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
+    )
+
+
+def has_switches(problem: TransferProblem) -> bool:
+    """Whether an answer may have several arcs: of full thrust and none, contacts, or limits of a force."""
+    several = bool(problem.constraints) or is_switched(problem) or bool(names_of(problem))
+    return several and can_be_parted(problem)
 
 
 def arcs_of(solution: Solution) -> tuple[Arc, ...]:
@@ -106,6 +130,14 @@ def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
         part = switch(problem, path, node)
         found.append((str(kinds[node]), float(at[node] + part * (at[node + 1] - at[node]))))
     return [*found, (str(kinds[-1]), 1.0)]
+
+
+def is_clear(coarse: Solution) -> bool:
+    """Whether a coarse answer shows its arcs well: |F| is not rounded, or none of them is short."""
+    if coarse.require_problem().actuator.smoothing is None:
+        return True
+    shortest = np.diff([0.0, *(arc.end for arc in arcs_of(coarse))]).min()
+    return bool(shortest * (len(coarse.path.fractions) - 1) > CLEAR)
 
 
 def surely_seen(arcs: tuple[Arc, ...], solution: Solution) -> tuple[Arc, ...]:
@@ -214,3 +246,9 @@ def from_plain(data: Sequence[list[Any]]) -> tuple[Arc, ...]:
         Arc(str(kind), float(end), *(None if one is None else Surface(*one) for one in surfaces))
         for kind, end, *surfaces in data
     )
+
+
+def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
+    """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
+    lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
+    return f"{len(arcs)} leg{'s' * (len(arcs) > 1)}: {', '.join(lengths)}"

@@ -121,9 +121,9 @@ def solve(
     zones and ways along limits of a coarse answer become the legs of a mission with free ends, in each of which
     nothing switches, so that the full order of the scheme is had. `order` and `steps` are then those of the
     coarse answer. The answer is a MissionSolution; where that does not succeed, or there is one arc alone, it
-    is as without. Where a tolerance below 1e-5 is all that is asked for, and an engine or a zone may switch,
-    this is tried by itself, and for a switched engine in a free time up to a tolerance of 1e-4; not with
-    `structure=False`.
+    is as without. Where a tolerance below 1e-5 is all that is asked for, and an engine, a zone or a limited
+    force may switch, this is tried by itself, and for a switched engine in a free time up to a tolerance of
+    1e-4; not with `structure=False`.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def _pays(problem: Any, chosen: tuple, tol: Any, hold: bool) -> bool:
         or not (tol < TIGHT or getattr(problem, "free_duration", False))
     ):
         return False
-    from dmoc.structure.solve import can_be_parted, has_switches, is_switched
+    from dmoc.structure.arcs import can_be_parted, has_switches, is_switched
 
     return has_switches(problem) if tol < TIGHT else is_switched(problem) and can_be_parted(problem)
 

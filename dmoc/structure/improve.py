@@ -41,10 +41,13 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
     more: list[Arc] = []
     missing = [_wrong(arcs, i, leg) for i, leg in enumerate(found.legs)] if is_switched(problem) else []
     # At both of its switches the function of a leg is zero, but for the errors of its steps.
-    doubt = max(WRONG, *(DOUBT * abs(float(wrong[-1])) for wrong in missing[1:-1]), 0.0)
+    both = [i for i in range(1, len(missing) - 1) if all(_is_switch(*arcs[k : k + 2]) for k in (i - 1, i))]
+    doubt = max([WRONG, *(DOUBT * abs(float(missing[i][-1])) for i in both)])
     missing = [np.where(wrong > doubt, wrong, 0.0) for wrong in missing]
     for i, wrong in enumerate(missing):
-        wrong[[0] * (i > 0) + [-1] * (i < len(missing) - 1)] = 0.0
+        # At a switch the function is zero but for errors; at a touch of a burn or of a coast it need not be.
+        wrong[[0] * (i > 0 and _is_switch(*arcs[i - 1 : i + 1]))] = 0.0
+        wrong[[-1] * (i < len(missing) - 1 and _is_switch(*arcs[i : i + 2]))] = 0.0
     worst = max((float(wrong.max()) for wrong in missing), default=0.0)
     for i, (arc, leg) in enumerate(zip(arcs, found.legs, strict=True)):
         begin = arcs[i - 1].end if i else 0.0
@@ -52,7 +55,7 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
         if worst and missing[i].max() == worst:
             parts = _parted(arcs, i, found, missing[i])
         else:
-            parts = _touching(problem, arc, leg, found.objective)
+            parts = _touching(problem, arcs, i, leg, found.objective)
         more += [part._replace(end=begin + (arc.end - begin) * part.end) for part in parts] or [arc]
     return tuple(more)
 
@@ -64,7 +67,8 @@ def _other_limits(
     if not names_of(problem):
         return None
     least = ACTS * abs(found.objective)
-    lacks = lacking(problem, [arc.kind for arc in arcs], [leg.path for leg in found.legs], least)
+    touching = [arc.touches is not None for arc in arcs]
+    lacks = lacking(problem, [arc.kind for arc in arcs], touching, [leg.path for leg in found.legs], least)
     if lacks is None:
         return None
     index, kind, wrong = lacks
@@ -162,15 +166,23 @@ def _is_switch(one: Arc, other: Arc) -> bool:
     return {one.kind, other.kind} == {BURN, COAST} and one.touches is None
 
 
-def _touching(problem: TransferProblem, arc: Arc, leg: Solution, objective: float) -> list[Arc]:
+def _touching(
+    problem: TransferProblem, arcs: Sequence[Arc], index: int, leg: Solution, objective: float
+) -> list[Arc]:
     """The parts of an arc between touches that it does not know of yet."""
+    arc = arcs[index]
+    # The start and the goal may be on a limit; else that is a touch.
+    known = (
+        None if index == 0 else (arcs[index - 1].touches, arcs[index - 1].follows, arc.follows),
+        None if index == len(arcs) - 1 else (arc.touches, arc.follows, arcs[index + 1].follows),
+    )
     acts = touched(problem, leg.path, ACTS * abs(objective))
     marks = [
         (0.5 * (first + last), surface)
         for surface, mask in acts.items()
         for first, last in spans_of(leg.path, mask)
     ]
-    marks = marks or pierced(problem, leg.path, leg.provenance.start_time)
+    marks = marks or pierced(problem, leg.path, leg.provenance.start_time, known)
     marks = [mark for mark in marks if mark[1] != arc.follows]
     for surface, mask in sped(problem, leg.path, ACTS * abs(objective)).items():
         if surface != arc.follows:

@@ -178,12 +178,17 @@ def continued(problem: TransferProblem, one: str, other: str) -> Iterator[Contin
 
 
 def lacking(
-    problem: TransferProblem, kinds: Sequence[str], paths: Sequence[DiscretePath], least: float
+    problem: TransferProblem,
+    kinds: Sequence[str],
+    touching: Sequence[bool],
+    paths: Sequence[DiscretePath],
+    least: float,
 ) -> tuple[int, str, np.ndarray] | None:
     """The leg in which another limit is kept to, what its controls do there, and by how much at its nodes.
 
-    A limit that is kept to is in the way where its multiplier has the sign of the other side; one that is not
-    kept to is to be where it acts, by `least` as in `kinds_along`.
+    `touching` says which legs end with the touch of a zone. A limit that is kept to is in the way where its
+    multiplier has the sign of the other side; one that is not kept to is to be where it acts, by `least` as in
+    `kinds_along`.
     """
     names = names_of(problem)
     pushes = [pushing(problem, path) for path in paths]
@@ -194,8 +199,8 @@ def lacking(
         for limit, side in enumerate(sides):
             wrong = np.maximum(-side * push[:, limit], 0.0) if side else np.abs(push[:, limit])
             wrong = np.where(_acting(problem, paths[i], least)[:, limit], wrong, 0.0)
-            # At a joint it is where one limit gives way to another.
-            wrong[[0] * (i > 0) + [-1] * (i < len(kinds) - 1)] = 0.0
+            # At a joint it is where one limit gives way to another, but not where a zone is touched.
+            wrong[[0] * (i > 0 and not touching[i - 1]) + [-1] * (i < len(kinds) - 1 and not touching[i])] = 0.0
             if wrong.max() <= most:
                 continue
             new = list(sides)

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.basics.digits import lasting
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
-from dmoc.guess.starting import angle_around
-from dmoc.meshes.choices import first_path
+from dmoc.meshes.choices import TRIAL_ORDER, TRIAL_STEPS, first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
@@ -22,7 +20,18 @@ from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.rungs.rung import cut_short
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.solve import check_numerics, solve
-from dmoc.structure.arcs import Arc, alike, arcs_of, is_switched, plain, surely_seen, without_waiting
+from dmoc.structure.arcs import (
+    Arc,
+    alike,
+    arcs_of,
+    can_be_parted,
+    is_clear,
+    is_switched,
+    plain,
+    surely_seen,
+    told,
+    without_waiting,
+)
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
@@ -32,14 +41,10 @@ from dmoc.structure.solution import structured
 # if an arc is hardly there, over the third in a second coarse answer: where the fuel hardly depends on
 # where it burns, a wide rounding hides short burns.
 WIDE, ROUNDED, LESS_ROUNDED = 1e-2, 1e-3, 1e-4
-# An arc is clearly there if it is longer than so many times the way from one node to the next [-].
-CLEAR = 3.0
 # The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
 COARSE_STEPS = {2: 60, 4: 30}
 # A second coarse answer has so many times the steps.
 FINER = 3
-# Over more revolutions than this there are too many arcs.
-MOST_TURNS = 10
 # Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that
 # something switches inside a leg.
 SETTLED = 1e-6
@@ -86,9 +91,12 @@ def solve_by_structure(
     if not can_be_parted(problem):
         return None
     coarse = coarse_answer(problem, order, steps, **more)
-    if coarse.success and not _is_clear(coarse):
+    if coarse.success and not is_clear(coarse):
         again = coarse_answer(problem, coarse.order, coarse.steps, ROUNDED, **more | {"guess": coarse.path})
-        coarse = replace(again, ladder=(*coarse.ladder, *again.ladder))
+        if again.status in ENDED:
+            return again
+        # Where that one is not found, or not in time, the first one stands.
+        coarse = replace(again, ladder=(*coarse.ladder, *again.ladder)) if again.success else coarse
     if not coarse.success:
         return coarse if coarse.status in ENDED else None
     found = _by_arcs(problem, coarse, tol, more)
@@ -165,29 +173,6 @@ def _is_settled(found: MissionSolution, coarse: int) -> bool:
     return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)
 
 
-def can_be_parted(problem: TransferProblem) -> bool:
-    """Whether arcs can be seen: of one body that does not turn, in few revolutions."""
-    return not (
-        problem.turns
-        or problem.links
-        or any(part.turns_body or part.point for part in problem.constraints)
-        or angle_around(problem, first_path(problem, 2, 100)) > 2 * np.pi * MOST_TURNS
-    )
-
-
-def has_switches(problem: TransferProblem) -> bool:
-    """Whether an answer may have more than one arc: of full thrust and none, or with and without contacts."""
-    return (bool(problem.constraints) or is_switched(problem)) and can_be_parted(problem)
-
-
-def _is_clear(coarse: Solution) -> bool:
-    """Whether a coarse answer shows its arcs well: |F| is not rounded, or none of them is short."""
-    if coarse.require_problem().actuator.smoothing is None:
-        return True
-    shortest = np.diff([0.0, *(arc.end for arc in arcs_of(coarse))]).min()
-    return bool(shortest * (len(coarse.path.fractions) - 1) > CLEAR)
-
-
 def coarse_answer(
     problem: TransferProblem, order: int | None, steps: int | None, rounded: float = WIDE, **more: Any
 ) -> Solution:
@@ -202,13 +187,16 @@ def coarse_answer(
             # On a singular arc forces of order 2 do not chatter.
             order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
             steps = COARSE_STEPS[order]
+        fixed = bool(problem.constraints) and not problem.free_duration
+        if order == TRIAL_ORDER and fixed and more.get("guess") is None:
+            # Around zones there are several optima: a solve to a tolerance begins so, and leads to the same.
+            trial = solve(problem, order, TRIAL_STEPS, sharp=False, **more)
+            if trial.success:
+                found = solve(problem, order, steps, sharp=False, **more | {"guess": trial.path})
+                return replace(found, ladder=(*trial.ladder, *found.ladder)) if found.success else trial
+            if trial.status in ENDED:
+                return trial
     return solve(problem, order, steps, sharp=False, **more)
-
-
-def told(arcs: Sequence[Arc], found: MissionSolution) -> str:
-    """What was found, such as `3 legs: burn 0.41 s, coast 1.9 s, burn 0.2 s`."""
-    lengths = [f"{arc.words()} {lasting(leg.duration, 4)}" for arc, leg in zip(arcs, found.legs, strict=True)]
-    return f"{len(arcs)} leg{'s' * (len(arcs) > 1)}: {', '.join(lengths)}"
 
 
 def verdict(found: MissionSolution) -> Report:
@@ -234,11 +222,13 @@ def _improved(
         known, first, found = settled
         arcs = known
         if first.solved:
-            attempt, found = _of_high_order(climb, problem, first, found, tol)
+            # Where controls keep to a limit they may be wrong between nodes on steps that fly them exactly.
+            seen = all(arc.alike == (FREE, None) for arc in arcs)
+            attempt, found = _of_high_order(climb, problem, first, found, tol, seen)
             # What meshes of low order do not show may be seen now, and is, before they are refined.
             arcs = known if attempt is first else improved(problem, known, found)
             if alike(arcs, known):
-                last, error, met = climb.refined(attempt, tol, ACCURATE, STILL)
+                last, error, met = climb.refined(attempt, tol, ACCURATE, STILL, seen)
                 found = answered(climb, last, error, met, tol)
                 arcs = improved(problem, known, found) if found.optimal and last is not attempt else arcs
         legs = found.legs
@@ -287,10 +277,18 @@ def _settled(
 
 
 def _of_high_order(
-    climb: Climb, problem: TransferProblem, attempt: Attempt, found: MissionSolution, tol: float | None
+    climb: Climb,
+    problem: TransferProblem,
+    attempt: Attempt,
+    found: MissionSolution,
+    tol: float | None,
+    seen: bool,
 ) -> tuple[Attempt, MissionSolution]:
-    """The attempt and the answer on meshes of high order, where those it was found on are not fine enough."""
-    if attempt.largest_error <= (ACCURATE if tol is None else tol):
+    """The attempt and the answer on meshes of high order, where those it was found on are not fine enough.
+
+    That is not `seen` by the errors of steps where controls keep to a limit.
+    """
+    if seen and attempt.largest_error <= (ACCURATE if tol is None else tol):
         return attempt, found
     course = Course.of(found.legs)
     path = attempt.path

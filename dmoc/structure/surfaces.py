@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -103,8 +104,16 @@ def _gap(constraint: Constraint, surface: Surface, size: int) -> tuple[ca.Functi
     return ca.Function("gap", [t, q, m], [gap]), limit
 
 
-def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[tuple[float, Surface]]:
-    """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit."""
+def pierced(
+    problem: TransferProblem,
+    path: DiscretePath,
+    begin: float,
+    known: tuple[Container | None, Container | None] = (None, None),
+) -> list[tuple[float, Surface]]:
+    """Where a leg breaks limits between its nodes: fractions of its duration, each with the limit.
+
+    `known` are the limits that the joints at its begin and at its end touch; None is all of them.
+    """
     at = (
         path.fractions[:-1, None] + np.diff(path.fractions)[:, None] * np.linspace(0, 1, BETWEEN + 1)[:-1]
     ).ravel()
@@ -116,8 +125,9 @@ def pierced(problem: TransferProblem, path: DiscretePath, begin: float) -> list[
         scale = float(np.ptp(broken))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], broken > PIERCED * scale, [0]])))
         for first, last in edges.reshape(-1, 2):
-            # What begins or ends at a joint is that joint's.
-            if first > 1 and last < len(at) - 1:
+            # What begins or ends at a joint that touches the limit is that joint's.
+            theirs = first <= 1, last >= len(at) - 1
+            if not any(ends and (of is None or surface in of) for ends, of in zip(theirs, known, strict=True)):
                 found.append((float(at[first + int(np.argmax(broken[first:last]))]), surface))
     return found
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from dmoc.basics.digits import lasting
-from dmoc.ipopt.run import STATUSES
-from dmoc.missions.answer import costs_of, worst_rows
+from dmoc.missions.answer import at_limits, costs_of, in_time, outcome_of, worst_rows
 from dmoc.results.between import Cut
 from dmoc.results.facts import Error, Provenance
-from dmoc.results.solution import NOT_MET, part_solution
-from dmoc.rungs.rung import cut_short
+from dmoc.results.solution import part_solution
 from dmoc.scene.clock import cautions_of, dates_of
 from dmoc.scene.team import Team
 from dmoc.teams.cuts import team_cuts
@@ -23,23 +20,14 @@ def answered(
     climb: Any, attempt: Any, error: Error | None = None, met: bool = True, tol: float | None = None
 ) -> TeamSolution:
     """The answer of an attempt as a TeamSolution; that of the last mesh solved if the time was over."""
-    if attempt.answer.status == "stopped" and climb.interrupt.late:
-        attempt = (climb.held or attempt).out_of_time()
-        found: Any = _answered(climb, attempt, error, True, tol)
-        return cut_short(found, climb.interrupt.seconds, attempt.solved)  # type: ignore[return-value]
-    return _answered(climb, attempt, error, met, tol)
+    return in_time(_answered, climb, attempt, error, met, tol)
 
 
 def _answered(climb: Any, attempt: Any, error: Error | None, met: bool, tol: float | None) -> TeamSolution:
     team, program, answer = climb.mission, attempt.program, attempt.answer
-    path, status, success = attempt.path, answer.status, attempt.solved
-    message = "a local optimum" if success else climb.reason or STATUSES[status].advice
-    if success and (broken := run_through(team_cuts(team, path))):
-        status, success, message = "infeasible", False, broken
-    if success and not met:
-        status, success = NOT_MET, False
-        reached = "unknown" if error is None else f"{error.largest:.1e}"
-        message = f"the estimated error is {reached}, you asked for {tol:g}; {STATUSES[NOT_MET].advice}"
+    path = attempt.path
+    broken = run_through(team_cuts(team, path)) if attempt.solved else ""
+    status, success, message = outcome_of(climb, attempt, error, met, tol, broken)
     about = Provenance(
         team.name,
         team.parameters,
@@ -98,12 +86,7 @@ def in_distances(team: Any, rows: Sequence[tuple[str, float, str]]) -> tuple[tup
 
 
 def _warnings(team: Team, path: TeamPath) -> tuple[str, ...]:
-    found = []
-    bound = team.members[0].limit_of_duration(path.duration)
-    if bound is not None:
-        other = "shorter" if bound == "shortest" else "longer"
-        ends = f"the duration ends on its {bound} limit of {lasting(path.duration, 6)}"
-        found.append(f"{ends}: a {other} one may cost less")
+    found = at_limits([("the duration", team.members[0], path.duration)], "limit")
     return (*found, *cautions_of(team))
 
 

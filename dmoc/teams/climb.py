@@ -43,6 +43,17 @@ class TeamClimb(Climb):
     """The attempts at one team, in their order."""
 
     program: Any = TeamProgram
+    answered: Any = answered
+
+    def prepared(self, first: Attempt, path: Any) -> Attempt:
+        return first
+
+    def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
+        found, error, met = self.refined(first, tol)
+        found = self.unleapt(found) if met else found
+        if found.solved and not path.warm:
+            found = self.round_the_other_way(found, path)
+        return (self.sharpened(found) if tol is None else found), error, met
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """As of a mission; where two bodies touch, the objective nears its limit by leaps.
@@ -78,7 +89,7 @@ class TeamClimb(Climb):
             attempt = found
         return attempt
 
-    def from_own_answers(self, attempt: Attempt, path: TeamPath) -> Attempt:
+    def otherwise(self, attempt: Attempt, path: TeamPath) -> Attempt:
         """An answer from paths that every body would take by itself, if all of them have one, bent apart."""
         team, legs = self.mission, []
         for problem, leg in zip(aimed(team.members, team.meetings(), path.duration), path.legs, strict=True):
@@ -139,22 +150,7 @@ def solve_team(
     check_numerics(order, steps, tol, hold, options, progress, time_limit)
     climb = TeamClimb(team, options, progress, compiled, time_limit)
     path = first_path(team, order, steps, hold, guess, mesh)
-    with climb.interrupt:
-        first = climb.attempt(path) if path.warm else climb.from_guess(path)
-        if not (first.solved or path.warm or climb.interrupt.seen):
-            first = climb.from_own_answers(first, path)
-        if not first.solved:
-            first = climb.explained(path, first)
-        if not first.solved:
-            return answered(climb, first)
-        given = steps is not None or mesh is not None
-        if given and tol is None:
-            return answered(climb, first)
-        found, error, met = climb.refined(first, tol)
-        found = climb.unleapt(found) if met else found
-        if found.solved and not path.warm:
-            found = climb.round_the_other_way(found, path)
-        return answered(climb, climb.sharpened(found) if tol is None else found, error, met, tol)
+    return climb.solve(path, tol, steps is not None or mesh is not None)
 
 
 def first_path(

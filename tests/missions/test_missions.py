@@ -127,6 +127,27 @@ def test_order_2_across_a_free_time():
     assert np.log2(errors[0] / errors[1]) > 1.7
 
 
+def test_a_leg_may_weigh_its_part_of_the_objective():
+    """By way of 1 m after 1 s, 2 s more to the goal: both are cubics in the velocity v at that place."""
+    weight, spans = 3.0, (1.0, 2.0)
+    speed = sum(w * 6 / h**2 for w, h in zip((weight, 1.0), spans, strict=True)) / sum(
+        w * 4 / h for w, h in zip((weight, 1.0), spans, strict=True)
+    )
+    parts = [0.5 * (4 / h * speed**2 - 12 / h**2 * speed + 12 / h**3) for h in spans]
+    legs = [Leg(1.0, objective=weight * dmoc.Effort()), Via((1, 0)), Leg(2.0)]
+    mission = Mission(1.0, State((0, 0), (0, 0)), State((2, 0), (0, 0)), legs)
+    found = dmoc.solve(mission, order=4, steps=2)
+    assert [leg.objective for leg in found.legs] == pytest.approx([weight * parts[0], parts[1]], rel=1e-12)
+    assert found.legs[0].velocity[-1][0] == pytest.approx(speed, rel=1e-10) and dmoc.verify(found).ok
+    assert mission.alone is None and replace(mission, legs=legs[:1]).alone is None
+
+
+@pytest.mark.parametrize("own", [dmoc.Time(), dmoc.FinalMass(), "least"])
+def test_an_objective_of_a_leg_that_cannot_be_added_is_refused(own):
+    with pytest.raises(ValueError, match=r"^leg 1: (its own objective|objective must)"):
+        Mission(1.0, State((0, 0), (0, 0)), State((2, 0), (0, 0)), [Leg(1.0, objective=own), Leg(1.0)])
+
+
 def test_a_stage_is_dropped_with_its_velocity():
     found = dmoc.solve(rocket())
     assert found.success and dmoc.verify(found).ok

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from dmoc import (
     BallForce,
@@ -30,6 +32,8 @@ from dmoc import (
 )
 from dmoc.plots.lanes import LEG_COLOURS, looks_of
 from dmoc.plots.page import figure, save_figure
+from dmoc.plots.sheet import ON_DARK
+from dmoc.plots.team import BODY_COLOURS
 
 
 def hohmann():
@@ -171,3 +175,21 @@ def test_a_page_tells_of_checks_and_can_do_without_the_mission(tmp_path):
     page = figure(load(tmp_path / "flight.nc"))
     assert "problem not attached" in page.get_supxlabel()
     assert legend(page.axes[-1]) == ["coast 1"]
+
+
+def test_legs_and_bodies_have_colours_that_differ_on_a_dark_background_too():
+    for palette in (LEG_COLOURS, BODY_COLOURS):
+        turned = [to_rgb(ON_DARK.get(colour.lower(), colour)) for colour in palette]
+        apart = [np.abs(np.subtract(one, other)).max() for one, other in combinations(turned, 2)]
+        assert min(apart) > 0.25
+
+
+def test_a_limit_is_drawn_in_all_legs_that_have_it():
+    """Legs pull with 3.5 N and with 1 N below one limit of 6 N."""
+    legs = [Leg(1.0), Via((1, 0)), Leg(4.0)]
+    ends = {"start": State((0, 0), (0, 0)), "goal": State((1.8, 0), (0, 0))}
+    mission = Mission(mass=1.0, **ends, legs=legs, actuator=BallForce(6.0))
+    page = figure(solve(mission, order=4, steps=4))
+    (forces,) = [axes for axes in page.axes if "Force" in axes.get_title(loc="left")]
+    limits = [line for line in forces.collections if line.get_label() == "limit"]
+    assert [np.ptp(line.get_segments()[0][:, 0]) for line in limits] == pytest.approx([1.0, 4.0])

@@ -305,7 +305,7 @@ def test_an_answer_from_what_each_would_do_alone():
     climb = PhasedClimb(plan, None, None, False, None)
     with climb.interrupt:
         failed = climb.attempt(path, most=1)
-        found = climb.from_own_answers(failed, path)
+        found = climb.otherwise(failed, path)
     assert not failed.solved and found.solved
 
 

@@ -347,6 +347,14 @@ def test_a_tight_tolerance_takes_structure_by_itself(numerics, legs):
         assert found.success and dmoc.verify(found).ok and found.tolerance == 1e-7
 
 
+@pytest.mark.parametrize(("limit", "legs"), [(1.1, 3), (2.0, 0)])
+def test_a_force_that_comes_to_its_limit_is_parted_by_itself(limit, legs):
+    """1 m from rest to rest in 2 s takes 1.5 N at both ends, if that is allowed."""
+    ends = State((0,), (0,)), State((1,), (0,))
+    found = dmoc.solve(TransferProblem(1.0, *ends, 2.0, actuator=BoxForce(limit)), tol=1e-10)
+    assert found.success and len(getattr(found, "legs", ())) == legs
+
+
 def test_without_switches_a_tight_tolerance_is_the_ladder():
     problem = TransferProblem(1.0, State((0,), (0,)), State((1,), (0,)), 1.0)
     assert not hasattr(dmoc.solve(problem, tol=1e-8), "legs")

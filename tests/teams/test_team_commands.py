@@ -109,7 +109,7 @@ def test_every_body_of_a_team_is_simulated(folder, capsys):
         assert one["final_position"] == pytest.approx(team.of(name).position[-1], abs=1e-8)
         assert (folder / f"marched_{name}.csv").read_text().startswith("time [s]")
     code, said = run(capsys, "simulate", "swap.py")
-    assert code == 0
+    assert code == 0 and said.out.index("red:") < said.out.index("green:")
 
 
 @pytest.mark.parametrize(
