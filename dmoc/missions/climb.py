@@ -18,6 +18,7 @@ from dmoc.missions.answer import answered, straightened
 from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
+from dmoc.missions.sharper import onto_magnitude
 from dmoc.missions.solution import MissionSolution
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
@@ -102,7 +103,8 @@ class Climb:
         if not path.warm and guess is None:
             first = with_best_drops(self, first, lambda one: first_path(one, order, steps, hold, None))
         first = straightened(self, first, MOST_TRYING)
-        return self.regraded(first, meshes_along(self.mission, first.path, order, steps))
+        first = self.regraded(first, meshes_along(self.mission, first.path, order, steps))
+        return onto_magnitude(self, first)
 
     def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
         """The answer on fine meshes, its error, and whether that is what was asked for."""

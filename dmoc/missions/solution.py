@@ -12,7 +12,7 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.chains.path import MissionPath
-from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.facts import Error, Level, Provenance, sharper
 from dmoc.results.netcdf import (
     Format,
     Table,
@@ -178,6 +178,10 @@ class MissionSolution(Outcome):
                 f"mission {problem.name!r} has {len(problem.plan)} legs, the solution {len(self.legs)}; "
                 "attach the mission that was solved"
             )
+        each = zip(self.legs, problem.stretches, strict=True)
+        widths = ((leg.provenance.smoothing, own.actuator.smoothing) for leg, own in each)
+        # An answer may round |F| less than was asked for, by one factor in all legs.
+        problem = sharper(problem, min((have / asked for have, asked in widths if have and asked), default=1.0))
         legs = [
             replace(leg, problem=None).attach(
                 problem.fixed_at(i, leg.provenance.start_time, float(leg.path.mass[0]), leg.duration)

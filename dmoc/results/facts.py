@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dmoc.scene.clock import dates_of
@@ -92,6 +92,9 @@ class Provenance:
     epoch, frame, center : str
         Date of t = 0 (TDB, ISO text), axes (ECLIPJ2000 or ICRF) and the body at the origin; empty where
         nothing in the scene knows them.
+    smoothing : float or None
+        Over which part of the largest thrust |F| was rounded [-], which may be less than was asked for; None
+        where it is not.
     """
 
     problem_name: str = "problem"
@@ -107,6 +110,7 @@ class Provenance:
     epoch: str = ""
     frame: str = ""
     center: str = ""
+    smoothing: float | None = None
 
     @classmethod
     def of(cls, problem: TransferProblem, options: dict[str, Any] | None = None) -> Provenance:
@@ -120,4 +124,27 @@ class Provenance:
             tuple(problem.actuator.units(problem.dimension)),
             options or {},
             **dates_of(problem),
+            smoothing=problem.actuator.smoothing,
         )
+
+
+def sharp_as(problem: TransferProblem, smoothing: float | None) -> TransferProblem:
+    """The problem with |F| rounded as little as in an answer of it that rounds it less."""
+    engine: Any = problem.actuator
+    if smoothing is None or engine.smoothing is None or engine.smoothing <= smoothing:
+        return problem
+    return replace(problem, actuator=replace(engine, smoothing=smoothing))
+
+
+def sharper(mission: Any, share: float) -> Any:
+    """A mission with |F| rounded at zero over this part of the width of each engine, if that is less."""
+
+    def less(actuator: Any) -> Any:
+        width = getattr(actuator, "smoothing", None)
+        return actuator if width is None or share >= 1 else replace(actuator, smoothing=share * width)
+
+    def of_part(part: Any) -> Any:
+        own = getattr(part, "actuator", None)
+        return part if own is None else replace(part, actuator=less(own))
+
+    return replace(mission, actuator=less(mission.actuator), legs=tuple(map(of_part, mission.legs)))

@@ -13,7 +13,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import COSTATE, DiscretePath
-from dmoc.results.facts import Error, Level, Provenance
+from dmoc.results.facts import Error, Level, Provenance, sharp_as
 from dmoc.results.moments import Moment, moment, named_body
 from dmoc.results.outcome import NOT_MET as NOT_MET
 from dmoc.results.outcome import OUT_OF_TIME as OUT_OF_TIME
@@ -229,7 +229,7 @@ class Solution(Outcome):
                     f"its {name} is {there:g}{unit}, the solution's {here:g}{unit}; "
                     "attach the problem that was solved"
                 )
-        return replace(self, problem=problem)
+        return replace(self, problem=sharp_as(problem, self.provenance.smoothing))
 
     def save(self, path: str | os.PathLike, **provenance: Any) -> None:
         """Write the solution to a netCDF-4 file, whole or not at all.

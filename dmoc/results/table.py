@@ -175,7 +175,9 @@ def provenance_of(facts: dict[str, Any], control_labels: tuple[str, ...] = ()) -
         json.loads(facts["versions"]),
         str(facts["created"]),
         # Only scenes with real dates have them.
-        *(str(facts.get(name, "")) for name in DATES),
+        **{name: str(facts.get(name, "")) for name in DATES},
+        # Only engines and the like have it.
+        smoothing=float(facts["smoothing"]) if "smoothing" in facts else None,
     )
 
 
@@ -208,6 +210,7 @@ def _attributes(solution: Any) -> dict[str, Any]:
         "time_unit": "s",
         **{name: value for name in DATES if (value := getattr(about, name))},
         "objective_unit": about.objective_unit,
+        **({} if about.smoothing is None else {"smoothing": about.smoothing}),
         "hold": int(getattr(solution, "hold", False)),
         "success": int(solution.success),
         **{name: getattr(solution, name) for name in plain.split()},

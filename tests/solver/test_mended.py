@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dmoc import BoxForce, KeepOut, State, TransferProblem, solve, verify
+from dmoc import BoxForce, Engine, Fuel, KeepOut, State, TransferProblem, load, solve, verify
 from dmoc.scene.problem_file import load_problem
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -46,3 +46,14 @@ def test_where_zones_leave_a_gap_that_is_as_good_as_closed_the_ways_round_all_ar
     assert found.success and verify(found).ok
     # The value was found by `local_optima` from six guesses.
     assert found.objective == pytest.approx(0.9288, rel=1e-2)
+
+
+def test_an_answer_with_a_sharper_magnitude_is_right_when_it_is_read_back(tmp_path):
+    """A thrust a thousand times the need: |F| is rounded less than the problem says, and the file tells it."""
+    engine = Engine(1000.0, exhaust_velocity=100.0, dry_mass=0.1)
+    ends = State((0, 0), (0, 0)), State((1, 0.5), (0, 0))
+    problem = TransferProblem(1.0, *ends, 4.0, actuator=engine, objective=Fuel())
+    solution = solve(problem).raise_for_status()
+    assert solution.provenance.smoothing < engine.smoothing
+    solution.save(tmp_path / "found.nc")
+    assert verify(load(tmp_path / "found.nc").attach(problem)).ok
