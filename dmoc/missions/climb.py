@@ -39,9 +39,8 @@ SHARP = 1e-12
 # That is near the rounding of the rows: three iterations without a gain end a run that has no barrier left.
 ENDING = {"ipopt.tol": SHARP, "ipopt.acceptable_iter": 3, "ipopt.acceptable_compl_inf_tol": 10 * SHARP}
 # There a step must not break the rows by more than so many times what the path breaks, or than one scaled [-].
-STAYING = 1.0
 # Where the cost hardly depends on where legs end the path stays nearer: Ipopt would else leave the valley.
-VALLEY = 1e-2
+STAYING, NEARER, VALLEY = 1.0, 0.1, 1e-2
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
 # Where there are more than two impulses their rounding falls to this in powers of ten [-].
@@ -62,6 +61,8 @@ class Climb:
     asked: tuple[int | None, int | None, bool, Any] = (None, None, False, None)
     # Whether all attempts are to be as sharp as those from nearly the answer.
     sharp = False
+    # How near attempts from nearly the answer stay to it.
+    staying = STAYING
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 
@@ -138,7 +139,7 @@ class Climb:
             limits |= ENDING
         if near is not None:
             limits |= dict.fromkeys(NEAR, near[0]) | {"ipopt.mu_init": near[1], **ENDING}
-            limits["ipopt.theta_max_fact"] = STAYING if self.valley is None else VALLEY
+            limits["ipopt.theta_max_fact"] = self.staying if self.valley is None else VALLEY
         built = time.perf_counter() - begun
         answer = program.solve(path, limits, self.options, watch, carried, self.compiled)
         if watch.error is not None:

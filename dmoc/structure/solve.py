@@ -14,7 +14,7 @@ from dmoc.meshes.choices import TRIAL_ORDER, TRIAL_STEPS, first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
-from dmoc.missions.climb import Climb
+from dmoc.missions.climb import NEARER, STAYING, Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import OUT_OF_TIME, Solution
 from dmoc.rungs.rung import cut_short
@@ -146,7 +146,7 @@ def _by_arcs(
     moving = without_waiting(arcs) if problem.free_duration and not problem.goal.anchored else arcs
     for these, dearer in ((arcs, np.inf), (moving, SAME_COST))[: 1 if moving == arcs else 2]:
         climb = Climb(mission_of(problem, these), *numerics)
-        climb.sharp = True
+        climb.sharp, climb.staying = True, NEARER if most > MOST_ITERATIONS else STAYING
         climb.levels.extend(coarse.ladder)
         with climb.interrupt:
             found = _improved(climb, problem, these, (coarse,), tol, most)
