@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -115,7 +115,7 @@ class Wheels(OnBody):
     def own_limits(self) -> tuple[Constraint, ...]:
         if self.max_momentum is None:
             return ()
-        return (MomentumLimit(tuple(np.broadcast_to(self.max_momentum, self.count).tolist())),)
+        return (MomentumLimit(tuple(np.broadcast_to(self.max_momentum, self.count).tolist()), own=True),)
 
     def size(self, dimension: int) -> int:
         return self.count
@@ -185,19 +185,43 @@ class Wheels(OnBody):
 
 @dataclass(frozen=True)
 class MomentumLimit(Constraint):
-    """Wheels that store no more angular momentum than they can: |h_i| <= limit_i. `Wheels` states it itself.
+    """Wheels that store no more angular momentum than they can: |h_i| <= limit_i.
 
     Parameters
     ----------
     limit : sequence of float
         Largest angular momentum of each wheel about its axis [N m s].
+    own : bool
+        Whether it is the `max_momentum` of the wheels, which `Wheels` states itself and anew.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not positive, or the scene has no wheels or another number of them.
     """
 
     limit: Vector
+    own: bool = field(default=False, repr=False)
     unit: ClassVar[str] = "N m s"
     adjustable: ClassVar[tuple[str, ...]] = ("limit",)
     turns_body: ClassVar[bool] = True
     moves_body: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        given = entries(self.limit)
+        if not given:
+            raise ValueError(
+                f"MomentumLimit: limit must list one number for each wheel [N m s]; got {short(self.limit)}"
+            )
+        names = (f"MomentumLimit: limit[{i}]" for i in range(len(given)))
+        found = (number(name, one, "N m s", positive=True) for name, one in zip(names, given, strict=True))
+        checked(self, limit=tuple(found))
+
+    def refuse_other_wheels(self, wheels: int) -> None:
+        """Refuse a scene with another number of wheels."""
+        if wheels != len(self.limit):
+            there = f"{wheels} wheels" if wheels else "no wheels: give it the actuator Wheels"
+            raise ValueError(f"MomentumLimit limits {len(self.limit)} wheels, but the scene has {there}")
 
     @property
     def limits_speed(self) -> bool:
@@ -239,12 +263,13 @@ class MomentumLimit(Constraint):
         return self.times(1 + slack)
 
     def within(self, problem: Any, entry: int) -> Any:
-        # It belongs to the wheels, which would state their own again.
+        if not self.own:
+            return super().within(problem, entry)
         return replace(problem, actuator=replace(problem.actuator, max_momentum=self.limit))
 
     def needs(self, eased: Constraint, index: int, amount: str) -> str:
         factor = (eased.largest_speed() or 0.0) / self.largest_speed()
-        return limit_told("max_momentum", self.limit, factor, "N m s")
+        return limit_told("max_momentum" if self.own else "momentum limit", self.limit, factor, "N m s")
 
 
 def _unit(index: int, value: Any) -> tuple[float, ...]:

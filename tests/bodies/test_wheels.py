@@ -14,6 +14,7 @@ from dmoc import (
     Pose,
     State,
     Time,
+    Torque,
     TransferProblem,
     UniformGravity,
     Wheels,
@@ -262,6 +263,36 @@ def test_a_problem_made_anew_has_one_limit_and_its_own_ends():
     assert other.start.momenta == (0.0,) * 4 and other.goal.momenta == (None,) * 4
     free = replace(first, actuator=replace(first.actuator, max_momentum=None))
     assert free.constraints == ()
+
+
+def test_a_limit_that_the_scene_states_stays_beside_that_of_the_wheels():
+    limit = MomentumLimit((0.05,) * 4)
+    bare = turn(actuator=Wheels(PYRAMID, 0.02), constraints=[limit])
+    assert bare.constraints == (limit,)
+    both = replace(bare, actuator=Wheels(PYRAMID, 0.02, 0.1))
+    assert [part.limit for part in both.constraints] == [(0.05,) * 4, (0.1,) * 4]
+    assert replace(both, actuator=replace(both.actuator, max_momentum=None)).constraints == (limit,)
+
+
+def test_wheels_keep_the_limit_that_the_scene_states():
+    scene = {"start": Attitude((1, 0, 0, 0)), "actuator": Wheels(np.eye(3).tolist(), 1.0)}
+    free = solve(turn(**scene), order=4, steps=20)
+    most = 0.8 * float(np.abs(free.wheel_momentum).max())
+    found = solve(turn(**scene, constraints=[MomentumLimit((most,) * 3)]), order=4, steps=20)
+    assert found.success and float(np.abs(found.wheel_momentum).max()) == pytest.approx(most, rel=1e-6)
+    assert found.objective > free.objective and verify(found).ok
+
+
+@pytest.mark.parametrize(
+    ("actuator", "told"),
+    [
+        (Torque(0.02), "limits 3 wheels, but the scene has no wheels: give it the actuator Wheels"),
+        (Wheels(PYRAMID, 0.02), "limits 3 wheels, but the scene has 4 wheels"),
+    ],
+)
+def test_a_limit_of_other_wheels_is_refused(actuator, told):
+    with pytest.raises(ValueError, match=told):
+        turn(actuator=actuator, constraints=[MomentumLimit((0.1,) * 3)])
 
 
 def test_the_exported_solver_takes_the_momenta_and_finds_the_same(tmp_path):

@@ -428,9 +428,8 @@ SHORT = {
     "motors of wheels": "the numbers that are named leave a check red on 24 steps",
     "a motor in a hinge": "the duration that is named leaves a check red on 20 steps",
     "pushes on one of two bodies": "the force and torque that are named are not enough",
-    "a limit of momentum": "a MomentumLimit beside Wheels without max_momentum is left out",
 }
-SLOW = LONG | set(SHORT) | {"ball torque", "what wheels store", "a motor in a slide"}
+SLOW = LONG | set(SHORT) | {"ball torque", "what wheels store", "a limit of momentum", "a motor in a slide"}
 
 
 def marked(name):
