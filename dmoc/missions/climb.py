@@ -243,7 +243,8 @@ class Climb:
             rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
-            onto = attempt.path.finer(attempt.to_cut(accurate if tol is None else tol))
+            # Of arcs nothing is left to be found, but in other missions errors tell where limits set in.
+            onto = attempt.path.finer(attempt.to_cut(tol or accurate) if self.sharp else attempt.errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
                 break
             found = self.on_finer(onto)
