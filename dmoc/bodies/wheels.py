@@ -217,11 +217,12 @@ class MomentumLimit(Constraint):
         found = (number(name, one, "N m s", positive=True) for name, one in zip(names, given, strict=True))
         checked(self, limit=tuple(found))
 
-    def refuse_other_wheels(self, wheels: int) -> None:
-        """Refuse a scene with another number of wheels."""
-        if wheels != len(self.limit):
+    def is_beside(self, wheels: int) -> bool:
+        """Whether the scene states it beside its wheels; refused with another number of them."""
+        if not self.own and wheels != len(self.limit):
             there = f"{wheels} wheels" if wheels else "no wheels: give it the actuator Wheels"
             raise ValueError(f"MomentumLimit limits {len(self.limit)} wheels, but the scene has {there}")
+        return not self.own
 
     @property
     def limits_speed(self) -> bool:

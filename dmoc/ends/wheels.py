@@ -103,11 +103,7 @@ def with_wheels(actuator: Actuator, start: Boundary, goal: Boundary, limits: tup
     bodies = [getattr(end, "body", end) for end in (start, goal)]
     count = len(actuator.wheel_axes)
     # What the wheels state themselves is stated anew below; what was stated beside them stays.
-    others = tuple(
-        limit
-        for limit in limits
-        if not isinstance(limit, MomentumLimit) or not (limit.own or limit.refuse_other_wheels(count))
-    )
+    others = tuple(limit for limit in limits if not isinstance(limit, MomentumLimit) or limit.is_beside(count))
     if count and all(body.turns_body for body in bodies):
         held = getattr(actuator, "start_momentum", None), getattr(actuator, "goal_momentum", None)
         free: tuple = (0.0,) * count, (None,) * count
