@@ -173,26 +173,18 @@ def in_plain_memory(
 
     To copy arrays into CasADi's matrices and back takes a tenth of the time of a small solve.
     """
-    buffer, evaluate = function.buffer()
     outputs = {name: np.empty(function.nnz_out(i)) for i, name in enumerate(function.name_out())}
-    # The arrays must live as long as the buffer looks at them.
     inputs = {
         i: np.ascontiguousarray(np.broadcast_to(given[name], function.nnz_in(i)), float)
         for i, name in enumerate(function.name_in())
-        if name in given and function.nnz_in(i)
+        if name in given
     }
-    for i, values in inputs.items():
-        buffer.set_arg(i, memoryview(values))  # type: ignore[arg-type]
-    for i, values in enumerate(outputs.values()):
-        if len(values):
-            buffer.set_res(i, memoryview(values))  # type: ignore[arg-type]
+    buffer, evaluate = _connected(function, inputs, list(outputs.values()))
     try:
         before = buffer.stats()
     except RuntimeError:  # It has not run yet.
         before = {}
     evaluate()
-    if buffer.ret():
-        raise RuntimeError(f"CasADi cannot evaluate {function.name()!r}")
     stats = buffer.stats()
     # Calls are counted on from run to run.
     return outputs, stats | {n: stats[n] - before.get(n, 0) for n in stats if n.startswith("n_call")}
@@ -216,8 +208,8 @@ def columns(function: ca.Function, *given: Any) -> tuple[np.ndarray, ...]:
     outputs = [np.empty((count, function.nnz_out(i))) for i in range(function.n_out())]
     for first in range(0, count, MOST_COLUMNS):
         part = slice(first, min(first + MOST_COLUMNS, count))
-        these, those = ([one[part] for one in each] for each in (inputs, outputs))
-        _evaluate(_side_by_side(function, part.stop - first), these, those)
+        these, those = {i: one[part] for i, one in enumerate(inputs)}, [one[part] for one in outputs]
+        _connected(_side_by_side(function, part.stop - first), these, those)[1]()
     return tuple(_dense(values, function.sparsity_out(i)) for i, values in enumerate(outputs))
 
 
@@ -234,18 +226,24 @@ def _side_by_side(function: ca.Function, count: int) -> ca.Function:
     return function.map(count) if count > 1 else function
 
 
-def _evaluate(function: ca.Function, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> None:
-    """Evaluate a function from arrays into arrays, which hold the nonzeros column by column."""
+def _connected(
+    function: ca.Function, inputs: dict[int, np.ndarray], outputs: list[np.ndarray]
+) -> tuple[Any, Callable]:
+    """A buffer of a function and what evaluates it, from arrays into arrays, which must live as long as it."""
     buffer, evaluate = function.buffer()
-    for i, values in enumerate(inputs):
+    for i, values in inputs.items():
         if values.size:
             buffer.set_arg(i, memoryview(values))  # type: ignore[arg-type]
     for i, values in enumerate(outputs):
         if values.size:
             buffer.set_res(i, memoryview(values))  # type: ignore[arg-type]
-    evaluate()
-    if buffer.ret():
-        raise RuntimeError(f"CasADi cannot evaluate {function.name()!r}")
+
+    def run() -> None:
+        evaluate()
+        if buffer.ret():
+            raise RuntimeError(f"CasADi cannot evaluate {function.name()!r}")
+
+    return buffer, run
 
 
 def _dense(values: np.ndarray, sparsity: ca.Sparsity) -> np.ndarray:

@@ -61,7 +61,7 @@ def write_mission_code(planner: MissionPlanner, functions: Sequence[Exported], f
         about = f"of {in_comment(words)}, order {scene.rule.order}"
         sizes[f"{name.upper()}_STEPS"] = scene.steps, f"steps {about}"
         sizes[f"{name.upper()}_NODES"] = scene.nodes, f"nodes {about}"
-    about = f"{len(planner.names)} {planner.stretch}s".replace("ys", "ies")
+    about = f"{len(planner.names)} {planner.stretches}"
     text = _filled(planner.mission.name, about, functions, sizes)
     guard = f"DMOC_{planner.kind.upper()}_H"
     (folder / f"{planner.kind}.h").write_text(text.replace("DMOC_TRANSFER_H", guard))

@@ -35,7 +35,7 @@ def about_mission(planner: MissionPlanner) -> dict[str, Any]:
     mission, legs = planner.mission, zip(planner.names, planner.mission.leg_names, planner.scenes, strict=True)
     return {
         "problem": {"name": mission.name, "parameters": mission.parameters},
-        {"leg": "legs", "body": "bodies"}[planner.stretch]: {
+        planner.stretches: {
             name: {
                 "words": words,
                 "scheme": _scheme(scene) | {"mesh": list(scene.mesh) or "equal steps"},

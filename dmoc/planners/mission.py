@@ -56,6 +56,9 @@ class MissionPlanner:
     # What it is and what its parts are, for people.
     kind: ClassVar[str] = "mission"
     stretch: ClassVar[str] = "leg"
+    stretches: ClassVar[str] = "legs"
+    # Where its rows are.
+    parts: ClassVar[str] = "legs and joints"
 
     @classmethod
     def of(
@@ -69,12 +72,8 @@ class MissionPlanner:
                 "mission that the guess solves, which is solution.problem where legs were made by a solve"
             )
         path = first_path(mission, order, steps, hold, guess)
-        scenes = tuple(
-            Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, uneven(leg.mesh))
-            for problem, leg in zip(mission.stretches, path.legs, strict=True)
-        )
         program = MissionProgram.of(mission, mission.stretches, path)
-        return cls(program, path, scenes, identifiers(mission.leg_names))
+        return cls(program, path, scenes_of(mission.stretches, path), identifiers(mission.leg_names))
 
     @property
     def mission(self) -> Mission:
@@ -231,6 +230,14 @@ def uneven(mesh: np.ndarray) -> tuple[float, ...]:
 def _matrix(values: ca.MX, group: Group, first: int) -> ca.MX:
     """A group of unknowns of a leg, one column an index."""
     return ca.reshape(values[first + group.start : first + group.stop], len(group.labels), group.count)
+
+
+def scenes_of(problems: Sequence[TransferProblem], path: Any) -> tuple[Scene, ...]:
+    """What each leg of a path is, on its mesh."""
+    return tuple(
+        Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, uneven(leg.mesh))
+        for problem, leg in zip(problems, path.legs, strict=True)
+    )
 
 
 def stretch_with(twin: Mission, index: int) -> TransferProblem:

@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 
 from dmoc.basics.arguments import entries
-from dmoc.motion.lobatto import scheme
 from dmoc.phases.between import SPANS
 from dmoc.phases.climb import first_phases
 from dmoc.phases.program import PhasedProgram
 from dmoc.phases.timetable import Timetable
-from dmoc.planners.functions import Scene
-from dmoc.planners.mission import MissionPlanner, identifiers, stretch_with, uneven
+from dmoc.planners.mission import MissionPlanner, identifiers, scenes_of, stretch_with
 from dmoc.planners.numbers import Number, Numbers, numbers_of_mission
 from dmoc.planners.terms import Term
 from dmoc.scene.mission import Mission
@@ -41,6 +39,7 @@ class PhasedPlanner(MissionPlanner):
     """
 
     kind = "team"
+    parts = "legs and joints and of what holds between bodies"
 
     @classmethod
     def of(  # type: ignore[override]
@@ -48,12 +47,8 @@ class PhasedPlanner(MissionPlanner):
     ) -> PhasedPlanner:
         """The planner of a team on the meshes of its guess, or on those it is solved on at first."""
         plan, path = first_phases(team, order, steps, hold, guess)
-        scenes = tuple(
-            Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, uneven(leg.mesh))
-            for problem, leg in zip(plan.stretches, path.legs, strict=True)
-        )
         program = PhasedProgram.of(plan, plan.stretches, path)
-        return cls(program, path, scenes, identifiers(plan.leg_names))
+        return cls(program, path, scenes_of(plan.stretches, path), identifiers(plan.leg_names))
 
     @cached_property
     def numbers(self) -> Numbers:
@@ -110,7 +105,7 @@ def _of_bodies(plan: Timetable) -> Iterator[Number]:
 def _of_times(plan: Timetable) -> Iterator[Number]:
     """The durations that are stated: of the whole once if all bodies state the same, else body by body."""
     names = identifiers(plan.names, "body")
-    stated = [_whole(one) for one in plan.team.members]
+    stated = [one.duration for one in plan.team.members]
     same = [body for body, value in enumerate(stated) if value is not None]
     if len({stated[body] for body in same}) == 1:
         yield _duration("", "all bodies", stated[same[0]], partial(_lasting, plan, same, None))
@@ -128,11 +123,6 @@ def _of_times(plan: Timetable) -> Iterator[Number]:
             if value is not None and hasattr(plan.team.members[body], "joints"):
                 words = f"{called.replace('_', ' ')} of {name.replace('_', ' ')}"
                 yield _duration(f"{name}_{called}_", words, value, partial(_lasting, plan, [body], leg))
-
-
-def _whole(member: Any) -> Any:
-    """What a member of a team states of its whole duration [s]."""
-    return member.duration
 
 
 def _duration(prefix: str, words: str, value: Any, changed: Callable) -> Number:

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.motion.lobatto import scheme
 from dmoc.planners.functions import Scene
-from dmoc.planners.mission import MissionPlanner, identifiers, uneven
+from dmoc.planners.mission import MissionPlanner, identifiers, scenes_of
 from dmoc.planners.numbers import Numbers, numbers_of_team
 from dmoc.planners.terms import Term
 from dmoc.teams.climb import first_path
@@ -25,7 +24,8 @@ class TeamPlanner(MissionPlanner):
     """
 
     kind = "team"
-    stretch = "body"
+    stretch, stretches = "body", "bodies"
+    parts = "bodies and of what holds between them"
 
     @classmethod
     def of(  # type: ignore[override]
@@ -33,11 +33,8 @@ class TeamPlanner(MissionPlanner):
     ) -> TeamPlanner:
         """The planner of a team on the mesh of its guess, or on that it is solved on at first."""
         path = first_path(team, order, steps, hold, guess)
-        scenes = tuple(
-            Scene(problem, scheme(leg.order), len(leg.mesh) - 1, leg.hold, uneven(leg.mesh))
-            for problem, leg in zip(team.members, path.legs, strict=True)
-        )
-        return cls(TeamProgram.of(team, team.stretches, path), path, scenes, identifiers(team.names, "body"))
+        program = TeamProgram.of(team, team.stretches, path)
+        return cls(program, path, scenes_of(team.members, path), identifiers(team.names, "body"))
 
     @cached_property
     def numbers(self) -> Numbers:

@@ -50,9 +50,7 @@ def residual(planner: MissionPlanner) -> Exported:
     found = _rows(planner, g, low, high, p, numbers | plan) | {
         "violation": _violation((x, lower, upper), (g, low, high))
     }
-    parts = f"{planner.stretch}s and joints".replace("bodys and joints", "bodies")
-    parts += " and of what holds between bodies" * (planner.kind == "team")
-    words = f"rows of all {parts} of a path, less what their bounds allow"
+    words = f"rows of all {planner.parts} of a path, less what their bounds allow"
     terms = planner.numbers.terms | planner.terms | _row_terms(planner)
     return Exported(_pruned("residual", numbers, plan, found, planner), words, terms)
 

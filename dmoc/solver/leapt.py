@@ -27,7 +27,6 @@ ANOTHER = 0.05
 SAME_OBJECTIVE = 1e-6
 # What a user is told of an answer that was mended, or could not be.
 LEAPT = "the first answer leapt a zone between two nodes: this one was found on a way past the zones"
-# What a user is told of an answer that was mended, or could not be.
 FAILED = "the first guess led nowhere: this answer was found on a way past the zones"
 
 
