@@ -126,11 +126,10 @@ def settled(made: Any, again: Callable[[Any], Any]) -> Any:
 
 
 def told(cause: Cause, problem: TransferProblem, holds: Callable[[TransferProblem], bool] | None) -> str:
-    """A cause in words, with remedies that hold; without constraints and propellant they always do."""
+    """A cause in words, with remedies that hold, if there is somebody to say which do."""
     # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
     local = problem.attraction.first is not None and problem.attraction.lone is None
-    risky = problem.constraints or problem.actuator.burns
-    return (cause.proven(holds) if risky and holds else cause).words(local)
+    return (cause.proven(holds) if holds else cause).words(local)
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:
