@@ -106,7 +106,7 @@ def energy_gap(evidence: Evidence) -> float | None:
 
 
 def _of_switches(evidence: Evidence, pushed: np.ndarray, rates: np.ndarray) -> float:
-    """How much more work the impulses of steps with a switch do at their mean velocity than node by node [J/kg].
+    """How much more work impulses of steps with a switch do at their mean velocity than node by node [J/kg].
 
     The force of a burn that is shorter than a step meets the velocity of one node, which may be that before or
     after all of it. Elsewhere the work of an impulse says nothing: of a free body it follows from the momentum.

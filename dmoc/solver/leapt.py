@@ -113,7 +113,7 @@ def _cleared(ladder: Ladder, rung: Rung, first: DiscretePath, refined: bool) -> 
 
 def _sharpened(ladder: Ladder, guess: DiscretePath) -> Rung:
     """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
-    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+    for _, width in rounding_stages([guess.mesh], ladder.problem):
         rung = ladder.try_on(guess, width)
         if not rung.solved:
             break

@@ -173,7 +173,7 @@ def _without_limits(ladder: Ladder, guess: DiscretePath) -> DiscretePath | None:
 
 def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
     """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
-    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+    for _, width in rounding_stages([guess.mesh], ladder.problem):
         rung = ladder.try_on(guess, width, pinned=pinned)
         if not rung.solved:
             break
