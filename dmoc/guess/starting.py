@@ -14,7 +14,7 @@ from dmoc.guess.coast import VERY_MANY_TURNS, controls_for
 from dmoc.guess.extremal import least_effort
 from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.open_ends import end_estimates, spiral_between, spiral_change
-from dmoc.guess.past_zones import off_centres
+from dmoc.guess.past_zones import off_centres, off_saddles
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -290,6 +290,7 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
     """Positions, the velocities of both ends, and whether the forces along the path are worth starting from."""
     q0, v0, q1, v1 = _end_states(problem, duration)
     if not problem.attraction.sources:
+        q1 = off_saddles(problem, duration, q1, v1)
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
     path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
     return path, (v0, v1), worth

@@ -186,6 +186,7 @@ PARTS = {
     "FinalMass": lambda: hop(BURNS, FinalMass()),
     "Time": lambda: hop(objective=Time(), duration=(1.0, 6.0)),
     "Time, Torque": lambda: turn(objective=Time(), duration=(0.5, 8.0)),
+    "Time, Engine": lambda: hop(BURNS, Time(), duration=(1.0, 6.0)),
     "WeightedSum": lambda: hop(objective=Effort() + 0.1 * Time(), duration=(1.0, 6.0)),
     "FinalRadius": lambda: orbit(OPEN, FinalRadius()),
     "FinalHeight": lambda: hop(objective=FinalHeight(axis=0), goal=State((None, 0), (0, 0))),
@@ -193,9 +194,7 @@ PARTS = {
     "DeltaV": lambda: legs(Impulse(), Coast(4.0), Impulse(), objective=DeltaV()),
     "State": lambda: hop(goal=State((2, None), (0, None))),
     "Condition": lambda: hop(
-        goal=Condition(lambda t, q, v, m: ca.dot(q, q) - 4, "circle", 4.0, State((None, None), (0, 0))),
-        # In the middle of the circle no way leads nearer to it than any other.
-        start=State((0.5, 0), (0, 0)),
+        goal=Condition(lambda t, q, v, m: ca.dot(q, q) - 4, "circle", 4.0, State((None, None), (0, 0)))
     ),
     "Moving": lambda: hop(goal=moving()),
     "Moving, Time": lambda: hop(goal=moving(), objective=Time(), duration=(0.5, 6.0)),
