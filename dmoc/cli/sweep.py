@@ -86,6 +86,9 @@ def sweep(
     error: Errors = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="S", help="End the solve of a point after so many seconds.")
+    ] = None,
     restart: Annotated[bool, switch("--restart", help="Begin anew instead of going on.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -103,6 +106,7 @@ def sweep(
     writable(out)
     begun = time.perf_counter()
     numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
+    numerics["time_limit"] = time_limit
     spread: dict[str, Any] = {"sample": sample, "method": method, "seed": seed}
     with _live(not (quiet or as_json)) as (progress, tries), _says_what_is_kept(out, tries), _warns_in_a_line():
         data = sweeping.sweep(
