@@ -181,7 +181,9 @@ def _leave(
         for one, two in zip(mine, other, strict=True)
     ]
     # The velocity goes on where no event changes it.
-    smooth = all(event.continued for event in joint.events)
+    smooth = all(
+        event.keeps_energy and not (event.turns_velocity or event.changes_frame) for event in joint.events
+    )
     for group in program.rows.groups:
         if not (group.owner and group.owner.field == "constraints" and same[group.owner.entry]):
             continue
