@@ -183,6 +183,7 @@ def coarse_answer(
     engine: Any = problem.actuator
     if engine.smoothing is not None and engine.smoothing < rounded:
         problem = replace(problem, actuator=replace(engine, smoothing=rounded))
+    tried = steps is not None and steps >= 2 * TRIAL_STEPS
     if order is None and steps is None:
         wanted = first_path(problem, guess=more.get("guess"))
         order, steps = wanted.order, len(wanted.mesh) - 1
@@ -190,15 +191,16 @@ def coarse_answer(
             # On a singular arc forces of order 2 do not chatter.
             order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
             steps = COARSE_STEPS[order]
-        fixed = bool(problem.constraints) and not problem.free_duration
-        if order == TRIAL_ORDER and fixed and more.get("guess") is None:
-            # Around zones there are several optima: a solve to a tolerance begins so, and leads to the same.
-            trial = solve(problem, order, TRIAL_STEPS, sharp=False, **more)
-            if trial.success:
-                found = solve(problem, order, steps, sharp=False, **more | {"guess": trial.path})
-                return replace(found, ladder=(*trial.ladder, *found.ladder)) if found.success else trial
-            if trial.status in ENDED:
-                return trial
+        tried = order == TRIAL_ORDER
+    fixed = bool(problem.constraints) and not problem.free_duration
+    if tried and fixed and more.get("guess") is None:
+        # Around zones there are several optima: a solve to a tolerance begins so, and leads to the same.
+        trial = solve(problem, TRIAL_ORDER, TRIAL_STEPS, sharp=False, **more)
+        if trial.success:
+            found = solve(problem, order, steps, sharp=False, **more | {"guess": trial.path})
+            return replace(found, ladder=(*trial.ladder, *found.ladder)) if found.success else trial
+        if trial.status in ENDED:
+            return trial
     return solve(problem, order, steps, sharp=False, **more)
 
 
