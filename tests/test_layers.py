@@ -25,6 +25,7 @@ LAYERS = [
     ["motion"],
     ["guess", "results", "flights"],
     ["ipopt"],
+    ["assembly"],
     ["nlp"],
     ["meshes"],
     ["diagnosis"],
