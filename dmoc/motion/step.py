@@ -232,7 +232,4 @@ def weighted(weights: np.ndarray, terms: Sequence) -> Any:
     if len(kept) > 1 and all(isinstance(term, ca.SX) and term.is_column() for _, term in kept):
         # CasADi adds up many columns at once in less time.
         return ca.horzcat(*[term for _, term in kept]) @ ca.DM([weight for weight, _ in kept])
-    total = 0
-    for weight, term in kept:
-        total = total + weight * term
-    return total
+    return sum((weight * term for weight, term in kept), 0)
