@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Block
 from dmoc.basics.memory import remembered
 from dmoc.chains.again import kernel_again
 from dmoc.legs.legs import Joint, Leg
@@ -15,7 +16,6 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import LEG_MASS, LEG_START
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.program import Program
