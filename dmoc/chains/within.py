@@ -138,7 +138,9 @@ def _met(program: Program, constraint: Any, of_speed: bool, state: tuple[np.ndar
     return bool(((lower - slack <= found) & (found <= upper + slack)).all())
 
 
-def _limit(program: Program, constraint: Any, of_speed: bool) -> tuple[ca.Function, np.ndarray, np.ndarray] | None:
+def _limit(
+    program: Program, constraint: Any, of_speed: bool
+) -> tuple[ca.Function, np.ndarray, np.ndarray] | None:
     """What a constraint limits at a place and a velocity, from where to where; None if more says it."""
     problem, body = program.problem, program.dynamics.configuration
     t, m, u = ca.SX.sym("t"), ca.SX.sym("m"), ca.SX.sym("u", problem.controls)
