@@ -179,7 +179,7 @@ def in_plain_memory(
         for i, name in enumerate(function.name_in())
         if name in given
     }
-    buffer, evaluate = _connected(function, inputs, list(outputs.values()))
+    buffer, evaluate = connected(function, inputs, list(outputs.values()))
     try:
         before = buffer.stats()
     except RuntimeError:  # It has not run yet.
@@ -209,7 +209,7 @@ def columns(function: ca.Function, *given: Any) -> tuple[np.ndarray, ...]:
     for first in range(0, count, MOST_COLUMNS):
         part = slice(first, min(first + MOST_COLUMNS, count))
         these, those = {i: one[part] for i, one in enumerate(inputs)}, [one[part] for one in outputs]
-        _connected(_side_by_side(function, part.stop - first), these, those)[1]()
+        connected(side_by_side(function, part.stop - first), these, those)[1]()
     return tuple(_dense(values, function.sparsity_out(i)) for i, values in enumerate(outputs))
 
 
@@ -222,11 +222,11 @@ def _of_columns(given: Any, size: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=256)
-def _side_by_side(function: ca.Function, count: int) -> ca.Function:
+def side_by_side(function: ca.Function, count: int) -> ca.Function:
     return function.map(count) if count > 1 else function
 
 
-def _connected(
+def connected(
     function: ca.Function, inputs: dict[int, np.ndarray], outputs: list[np.ndarray]
 ) -> tuple[Any, Callable]:
     """A buffer of a function and what evaluates it, from arrays into arrays, which must live as long as it."""

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from dmoc.assembly.blocks import Assembly, Block, Scaling
+from dmoc.assembly.kernel import Kernel, kernel
+from dmoc.assembly.symbolic import assemble
 from dmoc.basics.memory import Shelf, remembered
-from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
-from dmoc.nlp.kernel import Kernel, kernel
 from dmoc.nlp.transcription import MOST_HELD
 
 # The functions that are held, by the kernels of the blocks and the places that they are mapped to.

@@ -14,13 +14,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Block
 from dmoc.chains.again import kernel_again
 from dmoc.chains.within import Placed
 from dmoc.configurations.base import Configuration
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Instant, fixed_rows
 from dmoc.legs.legs import Joint
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout
 from dmoc.nlp.program import Program
 from dmoc.parts.rows import Row, snake, values_of, with_symbols

@@ -11,6 +11,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Assembly, Block, Scaling
+from dmoc.assembly.symbolic import assemble
 from dmoc.chains.again import assembled_again, kernel_again
 from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
 from dmoc.chains.path import MissionPath, joint_cost
@@ -18,7 +20,6 @@ from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows, with_ro
 from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.ipopt.options import NEAR, rounding, settings_for
 from dmoc.ipopt.run import Answer, Watch, make_solver, run
-from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
 from dmoc.nlp.layout import LEG_START, Layout
 from dmoc.nlp.transcription import MOST_HELD_NODES
 from dmoc.nlp.units import Units, units_of

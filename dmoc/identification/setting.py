@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from dmoc.assembly.blocks import Block
 from dmoc.basics.quaternions import normalised, times
 from dmoc.configurations.coordinates import ATTITUDE, PLACE
 from dmoc.configurations.of_problem import configuration_of
@@ -20,7 +21,6 @@ from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.march import node_masses
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
 from dmoc.nlp.stencils import Writer
 from dmoc.nlp.transcription import unassembled

@@ -42,6 +42,11 @@ NEAR = tuple(
 )
 
 
+def ipopt_alone(options: dict[str, Any] | None) -> bool:
+    """Whether a user's options are of Ipopt alone; those of CasADi may ask for a graph of the NLP."""
+    return all(name.startswith("ipopt.") for name in options or {})
+
+
 def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:
     """Ipopt's tolerance for scaled rows and gradients [-].
 

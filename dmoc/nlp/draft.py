@@ -7,8 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from dmoc.assembly.kernel import kernel
 from dmoc.guess.chart import drafted
-from dmoc.nlp.kernel import kernel
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Limit, Owner, Stencil
 from dmoc.parts.rows import Row
 

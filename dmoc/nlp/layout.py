@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dmoc.assembly.kernel import Kernel
 from dmoc.guess.chart import Chart
 from dmoc.ipopt.run import Answer
-from dmoc.nlp.kernel import Kernel
 from dmoc.parts.rows import Row
 
 # The group of rows g(q) = 0 has this name.

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.assembly.blocks import Block
 from dmoc.guess.chart import Chart
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_fractions, node_weights
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Layout, Limit, Stencil, Stencils
 from dmoc.nlp.lesson import (
     SENSITIVITY,

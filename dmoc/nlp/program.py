@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Assembly
 from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
@@ -18,7 +19,6 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath, Key
-from dmoc.nlp.assembly import Assembly
 from dmoc.nlp.layout import CONSTRAINT, LEG_MASS, LEG_START, Group, Layout
 from dmoc.nlp.lesson import SENSITIVITY, SPREAD, at_start
 from dmoc.nlp.placement import sensitivities

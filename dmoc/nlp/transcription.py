@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.assembly.blocks import Assembly, Block, Scaling
+from dmoc.assembly.streamed import assemble_streamed
+from dmoc.assembly.symbolic import assemble
 from dmoc.basics.arguments import entries, flag, number, of_kind, short, whole
 from dmoc.basics.memory import Shelf
 from dmoc.guess.chart import Chart
@@ -15,7 +18,6 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import DiscretePath
-from dmoc.nlp.assembly import Assembly, Block, Scaling, assemble
 from dmoc.nlp.layout import Stencils
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.solving import NLP
@@ -28,6 +30,9 @@ from dmoc.scene.problem import TransferProblem
 MOST_HELD = 16
 # An NLP of more nodes than this is not held: 16 smaller ones together take less than 100 MB.
 MOST_HELD_NODES = 2000
+# From so many nodes on no graph is built for a solve. With fewer, a graph is evaluated faster by more than it
+# takes to build, if there are many iterations.
+LEAST_STREAMED = 20_000
 # The NLPs that are held in this process, by structure, mesh, units and kind of control.
 _NLPS = Shelf(MOST_HELD)
 # Their functions, by structure and number of steps.
@@ -73,8 +78,12 @@ def transcribe_onto(
     units: Units,
     compiled: bool = False,
     chart: Chart | None = None,
+    streamed: bool = False,
 ) -> NLP:
     """The NLP on the mesh, order and kind of control of a guess.
+
+    If `streamed` a large one has functions with values only, without a graph: that takes a third of the time to
+    build and half the memory.
 
     An NLP that is held serves again for a problem of the same structure, on the same mesh and in the same
     units; not one with a `chart`, whose unknowns are counted from the path that it was made for.
@@ -87,11 +96,12 @@ def transcribe_onto(
     dynamics = Dynamics.of(problem)
     key = (id(stencils), mesh, sizes, guess.hold, compiled)
 
-    small = len(guess.position) <= MOST_HELD_NODES
+    nodes = len(guess.position)
+    small, streamed = nodes <= MOST_HELD_NODES, streamed and nodes >= LEAST_STREAMED
 
     def make() -> tuple[Stencils, NLP]:
         # The stencils are held with the NLP: once they were gone, another object might get their identity.
-        return stencils, _transcribed(problem, stencils, guess, units, compiled, chart, small)
+        return stencils, _transcribed(problem, stencils, guess, units, compiled, chart, small, streamed)
 
     _, nlp = _NLPS.get(key, make) if small and chart is None else make()
     return replace(nlp, problem=problem, dynamics=dynamics)
@@ -105,6 +115,7 @@ def _transcribed(
     compiled: bool,
     chart: Chart | None,
     small: bool,
+    streamed: bool,
 ) -> NLP:
     rule = scheme(guess.order)
     placed = Placement(problem, stencils, rule, guess.hold, guess.mesh, units, chart)
@@ -112,7 +123,8 @@ def _transcribed(
     scaling = Scaling.of(placed.blocks, columns.scales(), rows.scales(), 1 / units.cost)
 
     def make() -> tuple[Stencils, Assembly]:
-        return stencils, assemble(placed.blocks, scaling, stencils.parameter_count, compiled, small)
+        given = placed.blocks, scaling, stencils.parameter_count, compiled
+        return stencils, assemble_streamed(*given) if streamed else assemble(*given, small)
 
     _, assembly = _ASSEMBLIES.get((id(stencils), placed.steps, compiled), make) if small else make()
     parts = units, columns, rows, placed.row_bounds, assembly, assembly.numbers(scaling)

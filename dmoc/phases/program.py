@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Block
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram, unit_of_cost
 from dmoc.ipopt.run import Answer
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Layout
 from dmoc.nlp.units import units_of
 from dmoc.phases.between import BetweenMissions

@@ -12,9 +12,9 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from dmoc.assembly.blocks import Block
+from dmoc.assembly.kernel import Kernel
 from dmoc.basics.memory import Shelf
-from dmoc.nlp.assembly import Block
-from dmoc.nlp.kernel import Kernel
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 from dmoc.planners.numbers import Numbers, numbers_of_team

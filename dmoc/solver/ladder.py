@@ -14,7 +14,7 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
-from dmoc.ipopt.options import barrier_from
+from dmoc.ipopt.options import barrier_from, ipopt_alone
 from dmoc.ipopt.run import STATUSES, Interrupt
 from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.motion.dynamics import Dynamics
@@ -231,7 +231,7 @@ class Ladder:
         near = in_tube(problem, guess)
         onward = barrier_from(problem, guess) | limits
         if near is not None and (tubed := self._attempt(guess, near, HALFWAY | limits)).solved:
-            guess, onward = out_of_tube(tubed.path), FROM_HALFWAY | limits
+            guess, onward = out_of_tube(tubed.path), limits | FROM_HALFWAY
         here = partial(self._attempt, problem=problem, limits=onward)
         return led(here(guess), self.ask, problem, guess, here)
 
@@ -255,7 +255,8 @@ class Ladder:
         begun = time.perf_counter()
         carried = last is not None and not np.array_equal(guess.mesh, last.nlp.mesh)
         units = units_of(problem, guess)
-        nlp = transcribe_onto(problem, guess, units, self.compiled, chart_of(problem, guess, units.origin))
+        chart = chart_of(problem, guess, units.origin)
+        nlp = transcribe_onto(problem, guess, units, self.compiled, chart, ipopt_alone(self.options))
         watch = nlp.watch(problem, self.progress, self.interrupt)
         asked_of = nlp.leaning(guess, lean) if lean else nlp
         solver = asked_of.solver(self.options, bool(guess.multipliers), carried, watch, limits)

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.assembly.blocks import Block
+from dmoc.assembly.kernel import Kernel, kernel
 from dmoc.chains.within import Placed
-from dmoc.nlp.assembly import Block
-from dmoc.nlp.kernel import Kernel, kernel
 from dmoc.nlp.layout import Layout
 from dmoc.parts.rows import Row
 from dmoc.scene.team import Team

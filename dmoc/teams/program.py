@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from dmoc.assembly.blocks import Block
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.chains.within import Placed, leg_program
 from dmoc.ipopt.run import Answer
-from dmoc.nlp.assembly import Block
 from dmoc.nlp.layout import Group
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem import TransferProblem

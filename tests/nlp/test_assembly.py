@@ -37,9 +37,12 @@ from dmoc import (
     transcribe,
     verify,
 )
+from dmoc.assembly import streamed
+from dmoc.assembly.blocks import Scaling
+from dmoc.assembly.symbolic import assemble
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.lobatto import scheme
-from dmoc.nlp.assembly import Scaling, assemble
+from dmoc.nlp import transcription
 from dmoc.nlp.placement import Placement
 from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.units import units_of
@@ -190,6 +193,49 @@ def test_units_and_mesh_may_be_parameters(name, hold):
         ours, theirs = (getattr(parts, given)(x, q, *dual) for parts, q in both)
         pair = (ours[1], theirs[1]) if given in ("gradient", "jacobian") else (ours, theirs)
         np.testing.assert_allclose(pair[0].full(), pair[1].full(), rtol=1e-13, atol=1e-13)
+
+
+RESULTS = ("objective", "constraints", "gradient", "jacobian", "hessian")
+
+
+@pytest.mark.parametrize("hold", [False, True], ids=["nodal", "held"])
+@pytest.mark.parametrize("scene", SCENES)
+def test_functions_without_a_graph_are_the_same(scene, hold, monkeypatch):
+    """Values, patterns and names; in the last columns that are evaluated at a time there are fewer."""
+    monkeypatch.setattr(streamed, "MOST_COLUMNS", 3)
+    problem, mesh = SCENES[scene], np.array([0, 0.1, 0.3, 0.6, 0.8, 1.0])
+    guess = starting_guess(problem, mesh, 4, hold)
+    stencils, units = stencils_of(problem, 4, hold), units_of(problem, guess)
+    placed = Placement(problem, stencils, scheme(4), hold, mesh, units)
+    scaling = Scaling.of(placed.blocks, placed.columns.scales(), placed.rows.scales(), 0.7)
+    drawn, plain = (
+        make(placed.blocks, scaling, stencils.parameter_count)
+        for make in (assemble, streamed.assemble_streamed)
+    )
+    numbers = np.random.default_rng(5)
+    x, lam = (numbers.uniform(0.4, 0.6, size) for size in (drawn.x.numel(), drawn.g.numel()))
+    p = numbers.uniform(0.5, 1.0, stencils.parameter_count)
+    for kind in RESULTS:
+        given = (x, p, 0.8, lam) if kind == "hessian" else (x, p)
+        functions = [getattr(parts, kind) for parts in (plain, drawn)]
+        seen, expected = (function.call([ca.DM(one) for one in given])[-1] for function in functions)
+        assert seen.sparsity() == expected.sparsity()
+        assert_same(seen, expected)
+        names = [(one.name(), one.name_in(), one.name_out()) for one in functions]
+        assert kind in ("objective", "constraints") or names[0] == names[1]
+
+
+def test_a_large_solve_has_no_graph(monkeypatch):
+    """It makes the iterates of one with a graph; options of CasADi get the graph that they may ask for."""
+    problem = SCENES["plane, gravity"]
+    drawn = solve(problem, steps=2001)
+    monkeypatch.setattr(transcription, "LEAST_STREAMED", 2001)
+    monkeypatch.setattr(transcription, "assemble", None)
+    plain = solve(problem, steps=2001)
+    assert [level.iterations for level in plain.ladder] == [level.iterations for level in drawn.ladder]
+    np.testing.assert_allclose(plain.position, drawn.position, rtol=0, atol=1e-12)
+    with pytest.raises(TypeError):
+        solve(problem, steps=2001, options={"verbose_init": False})
 
 
 def instructions(function):

@@ -43,6 +43,14 @@ class Kernel:
         """The functions as machine code where that can be had."""
         return compiled(self.functions)
 
+    def results(self, compiled: bool) -> dict[str, ca.Function]:
+        """The functions whose result is not zero by its structure; with `compiled` as machine code."""
+        return {
+            kind: function
+            for kind, function in (self.compiled if compiled else self.functions).items()
+            if function.numel_out(0) and (self.costly or kind not in ("cost", "gradient"))
+        }
+
 
 def kernel(
     name: str,
