@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.past_zones import has_sides
+from dmoc.ipopt.run import STATUSES
 from dmoc.motion.path import DiscretePath
 from dmoc.results.flown_cost import mass_worth
 from dmoc.results.switches import has_linear_controls
@@ -45,6 +46,14 @@ NEAR = tuple(
 def ipopt_alone(options: dict[str, Any] | None) -> bool:
     """Whether a user's options are of Ipopt alone; those of CasADi may ask for a graph of the NLP."""
     return all(name.startswith("ipopt.") for name in options or {})
+
+
+def advice_of(status: str, options: dict[str, Any] | None = None) -> str:
+    """What to try after a status; where the user's own options ended the run, that these let it go on."""
+    most = (options or {}).get("ipopt.max_iter")
+    if status == "iteration limit" and most is not None:
+        return f"options={{'ipopt.max_iter': {most}}} ended it: give more, or leave it out"
+    return STATUSES[status].advice
 
 
 def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:

@@ -14,8 +14,8 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
-from dmoc.ipopt.options import barrier_from, ipopt_alone
-from dmoc.ipopt.run import STATUSES, Interrupt
+from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
+from dmoc.ipopt.run import Interrupt
 from dmoc.meshes.choices import coarse_to_fine, rounding_stages
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
@@ -287,7 +287,7 @@ class Ladder:
         known = errors or {}
         reason = "" if rung.cause is None or rung.solved else told(rung.cause, self.problem, self.holds)
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
-        message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
+        message = "a local optimum" if rung.solved else reason or advice_of(rung.answer.status, self.options)
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
         return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
