@@ -24,6 +24,7 @@ from dmoc.structure.arcs import (
     alike,
     arcs_of,
     can_be_parted,
+    from_plain,
     is_clear,
     plain,
     surely_seen,
@@ -32,7 +33,7 @@ from dmoc.structure.arcs import (
 )
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.coarse import ENDED, LESS_ROUNDED, ROUNDED, coarse_answer
-from dmoc.structure.improve import improved
+from dmoc.structure.improve import improved, is_pulled
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
@@ -150,7 +151,8 @@ def _by_arcs(
             continue
         if found.status in ENDED:
             return found
-        if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok:
+        sure = found.optimal and _is_settled(found, len(coarse.ladder))
+        if sure and not is_pulled(from_plain(found.arcs), found) and verdict(found).ok:
             return found
     return None
 
