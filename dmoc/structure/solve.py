@@ -183,8 +183,10 @@ def _improved(
     iterations: int,
 ) -> MissionSolution | None:
     """The arcs of an answer on fine meshes, once no mesh shows that one is missing or in vain."""
-    spent = _work(climb)
+    spent = climb.work
     most = MOST_WORK + MOST_TIMES * spent
+    if tol is None:
+        climb.most_work = spent + most
     for _ in range(MOST_ROUNDS):
         settled = _settled(climb, problem, arcs, legs, (spent + most, iterations))
         if settled is None:
@@ -207,11 +209,6 @@ def _improved(
     return None
 
 
-def _work(climb: Climb) -> int:
-    """Iterations times steps so far, which take about equally long."""
-    return sum(level.iterations * level.steps for level in climb.levels)
-
-
 def _settled(
     climb: Climb,
     problem: TransferProblem,
@@ -227,7 +224,7 @@ def _settled(
         climb.mission = mission_of(problem, arcs)
         path = path_of(problem, arcs, legs)
         for near in NEAR:
-            if _work(climb) > most[0]:
+            if climb.work > most[0]:
                 return None
             attempt = climb.attempt(path, most=most[1], near=near)
             if attempt.solved or attempt.answer.status == "stopped":
