@@ -78,8 +78,10 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
     if arc.kind == BURN:
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
-    # Where a speed is kept to along a line, that says what the control is; in a plane it may turn.
-    turning = problem.dimension > 1 and bool(linear_controls(problem).all())
+    # Where a speed is kept to along a line, that says what the control is; in a plane it may turn, and where no
+    # thrust is paid for nothing says how.
+    unpaid = bool(names_of(problem)) and bool(linear_controls(problem).all())
+    turning = problem.dimension > 1 and unpaid
     singular = turning if is_of_speed(problem, arc.follows) else arc.kind == SINGULAR
     degree = SINGULAR_DEGREE if singular else None
     sides = sides_of(problem, arc.kind)
