@@ -23,7 +23,8 @@ from dmoc.structure.surfaces import Surface, touched
 BURN, COAST, SINGULAR = "burn", "coast", "singular arc"
 # Where the way is along a zone, part of the thrust is what turns the path with the surface.
 PARTLY = "partial thrust"
-# A contact with more than this part of the thrust, and not all of it at more than so many nodes, is such an arc [-].
+# Such an arc is a contact with more than this part of the thrust [-], and not all of it at more than so many
+# nodes.
 PART, MOST_FULL = 0.1, 2
 # A limit acts if loosening it by its own size would change the objective by this part of it [-].
 ACTS = 1e-5

@@ -23,7 +23,7 @@ WRONG = 1e-6
 DOUBT = 10.0
 # An arc between two touches of a limit is at it throughout if it is within this part of all the room [-].
 SAME = 1e-5
-# A zone pulls where a multiplier of its surface has the wrong sign and is more than this part of the largest [-].
+# A zone pulls where a multiplier of its surface with the wrong sign is more than this part of the largest [-].
 PULLS = 0.1
 # A new arc begins with this part of the whole duration on either side of where that is furthest wrong [-]: a
 # longer one leads away from the answer so far.
@@ -179,7 +179,7 @@ def _parted(
 def _turned(
     problem: TransferProblem, arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray
 ) -> list[Arc]:
-    """A coast with a way along the zone that it touches where it most lacks a burn; nothing if it touches none."""
+    """A coast with a way along the zone that it touches where it most lacks a burn; else nothing."""
     arc, peak = arcs[index], int(np.argmax(wrong))
     share = min(TURNING * found.duration / found.legs[index].duration, 0.5)
     begin = arcs[index - 1].touches if index else None

@@ -84,7 +84,7 @@ def test_a_zone_that_is_cut_beside_a_joint_is_broken_there_unless_the_joint_touc
 
 @pytest.mark.parametrize("mesh", [(4, 30), (2, 60)])
 def test_least_time_in_a_plane_at_a_speed_limit_has_all_digits(mesh):
-    """Where no cost says how the force turns at that speed, it is a polynomial: at each node alone it chatters."""
+    """Where no cost says how the force turns at that speed, it is a polynomial: else it chatters."""
     ends, speed, force = (State((0, 0), (0, 0)), State((4, 3), (0, 0))), 0.8, 0.9
     problem = TransferProblem(
         1.0, *ends, (1.0, 30.0), constraints=[SpeedLimit(speed)], actuator=BallForce(force), objective=Time()
