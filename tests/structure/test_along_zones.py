@@ -77,7 +77,7 @@ def test_part_of_the_thrust_turns_the_path_along_a_zone(mesh):
 
 
 def test_burns_and_coasts_alone_came_to_the_zone_from_inside():
-    """One chain of them cut it by 2.7 mm between its nodes and cost 9e-4 less than may be; others are dearer."""
+    """One chain of them cut it by 2.7 mm between its nodes and cost 9e-4 less than may be."""
     ends = State((0, 0), (0, 0)), State((6, 0), (0, 0))
     zone, engine = KeepOut((2.61, -0.244), 0.7025), Engine(0.3552, exhaust_velocity=10.0)
     problem = TransferProblem(1.0, *ends, 18.62, constraints=[zone], actuator=engine, objective=Fuel())
