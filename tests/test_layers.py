@@ -180,3 +180,11 @@ def test_a_public_name_is_never_hidden_by_a_module_of_that_name():
 
     modules = {path.name for path in ROOT.iterdir()}
     assert not modules & set(dmoc.__all__)
+
+
+def test_every_import_of_the_package_is_a_public_name():
+    """They are found by their words, for speed; a parser of Python finds the same."""
+    tree = ast.parse((ROOT / "__init__.py").read_text())
+    listed = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    homes = {alias.name: node.module for node in listed for alias in node.names}
+    assert dmoc._homes() == {name: home for name, home in homes.items() if home.startswith("dmoc.")}

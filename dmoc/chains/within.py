@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.assembly.blocks import Block
+from dmoc.basics.memory import remembered
 from dmoc.chains.again import kernel_again
 from dmoc.legs.legs import Joint, Leg
 from dmoc.motion.dynamics import Dynamics
@@ -23,6 +24,9 @@ from dmoc.nlp.units import Units
 from dmoc.parts.rows import Row
 from dmoc.scene.mission import Mission
 from dmoc.scene.problem import TransferProblem
+
+# A state keeps a limit that it breaks by no more than this [-]: rounding.
+KEPT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,63 @@ def open_leg(mission: Mission, legs: tuple[Placed, ...], index: int, sides: list
     if index + 1 < len(legs):
         _leave(program, legs[index + 1].program.problem, (-1, "goal"), behind, sides)
     for place, joint in ((0, before), (-1, behind)):
+        if joint.boundary is not None and (joint.left is None or joint.right is None):
+            _leave_known(program, joint, place, sides)
         for event in joint.events:
             if event.continued and event.left_behind == (place == -1):
                 _leave_controls(program, event.continued, place, sides)
+
+
+def _leave_known(program: Program, joint: Joint, place: int, sides: list[np.ndarray]) -> None:
+    """Leave the limits that a start or a goal meets by what it says of place and velocity.
+
+    Its own rows and those of a limit that it lies on would depend on each other, and their multipliers grow
+    without bound.
+    """
+    problem, end = program.problem, "start" if place == 0 else "goal"
+    if problem.turns or problem.links or joint.boundary is None:
+        return
+    state = joint.boundary.fixed()
+    known = [not np.isnan(part).any() for part in state]
+    known[1] &= known[0] and not joint.events
+    for group in program.rows.groups:
+        if not (group.owner and group.owner.field == "constraints" and known[group.kind == "end"]):
+            continue
+        if group.kind == "node" or group.owner.end == end:
+            at = group.indices[:, place] if group.kind == "node" else group.indices[:, 0]
+            if _met(program, group.owner.of(problem), group.kind == "end", state):
+                sides[2][at], sides[3][at] = -np.inf, np.inf
+    if known[0]:
+        places = program.columns["position"].indices[:, place]
+        at = (state[0] - program.units.origin) / program.columns.scales()[places]
+        met = (sides[0][places] <= at + KEPT) & (at - KEPT <= sides[1][places])
+        sides[0][places[met]], sides[1][places[met]] = -np.inf, np.inf
+
+
+def _met(program: Program, constraint: Any, of_speed: bool, state: tuple[np.ndarray, np.ndarray]) -> bool:
+    """Whether a state keeps a limit, whatever the time, the mass and the controls are."""
+    made = remembered(lambda: _limit(program, constraint, of_speed), "met", constraint, of_speed, len(state[0]))
+    if made is None:
+        return False
+    values, lower, upper = made
+    found = values(*(np.nan_to_num(part) for part in state)).full().ravel()
+    slack = KEPT * np.maximum(1.0, np.abs(found))
+    return bool(((lower - slack <= found) & (found <= upper + slack)).all())
+
+
+def _limit(
+    program: Program, constraint: Any, of_speed: bool
+) -> tuple[ca.Function, np.ndarray, np.ndarray] | None:
+    """What a constraint limits at a place and a velocity, from where to where; None if more says it."""
+    problem, body = program.problem, program.dynamics.configuration
+    t, m, u = ca.SX.sym("t"), ca.SX.sym("m"), ca.SX.sym("u", problem.controls)
+    q, v = ca.SX.sym("q", problem.size), ca.SX.sym("v", problem.size)
+    at = body.at(q, v, m)
+    rows = constraint.speed_rows_at(at) if of_speed else constraint.rows_at(t, at, u, m)
+    values = ca.vertcat(*(ca.SX(row.expression) for row in rows))
+    if ca.depends_on(values, ca.vertcat(t, m, u)):
+        return None
+    return ca.Function("limit", [q, v], [values]), *(np.array([row[i] for row in rows]) for i in (2, 3))
 
 
 def _leave_controls(program: Program, which: tuple[int, ...], place: int, sides: list[np.ndarray]) -> None:
@@ -125,7 +183,9 @@ def _leave(
         for one, two in zip(mine, other, strict=True)
     ]
     # The velocity goes on where no event changes it.
-    smooth = all(event.continued for event in joint.events)
+    smooth = all(
+        event.keeps_energy and not (event.turns_velocity or event.changes_frame) for event in joint.events
+    )
     for group in program.rows.groups:
         if not (group.owner and group.owner.field == "constraints" and same[group.owner.entry]):
             continue

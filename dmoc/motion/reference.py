@@ -141,12 +141,17 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     t, h, begin, share = (ca.SX.sym(name) for name in ("t", "h", "begin", "share"))
     origin, tolerances = ca.SX.sym("origin", n), ca.SX.sym("tolerances", states)
 
+    # What is written down once costs less than what Python writes at every stage.
+    fraction, y = ca.SX.sym("fraction"), ca.SX.sym("y", states)
+    degrees = range(size // count if count else 0)
+    u = sum((powers[count * p : count * (p + 1)] * fraction**p for p in degrees), ca.SX.zeros(count))
+    q, v, flow = y[:n] + origin, y[n:-1], dynamics.actuator.flow(u)
+    push = dynamics.acceleration(t + fraction * h, q, v, y[-1], dynamics.wrench(q, u))
+    moves = ca.vertcat(dynamics.configuration.velocity(q, v), push, 0 if flow is None else -flow)
+    rates = ca.Function("rates", [fraction, y, powers, t, h, origin], [moves])
+
     def rate(fraction, y):
-        degrees = range(size // count if count else 0)
-        u = sum((powers[count * p : count * (p + 1)] * fraction**p for p in degrees), ca.SX.zeros(count))
-        q, v, flow = y[:n] + origin, y[n:-1], dynamics.actuator.flow(u)
-        push = dynamics.acceleration(t + fraction * h, q, v, y[-1], dynamics.wrench(q, u))
-        return ca.vertcat(dynamics.configuration.velocity(q, v), push, 0 if flow is None else -flow)
+        return rates(fraction, y, powers, t, h, origin)
 
     length = share * h
     slopes: list[ca.SX] = []

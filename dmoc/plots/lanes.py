@@ -15,6 +15,7 @@ from dmoc.plots.style import (
     DARK,
     LIMIT,
     flown_force,
+    moments,
     readable,
     speeds,
     within_steps,
@@ -119,12 +120,12 @@ def _draw_primer(axes: Any, solution: MissionSolution, late: float) -> None:
 def _draw_speed(axes: Any, solution: MissionSolution, late: float) -> None:
     """The speed of each leg; it jumps at impulses."""
     curves = [speeds(leg) for leg in solution.legs]
-    every = np.concatenate([speed for _, speed in curves])
+    every = np.concatenate([speed[np.isfinite(speed)] for _, speed in curves])
     size, unit = readable(every, "m/s")
     for (times, speed), look in zip(curves, looks_of(solution.legs), strict=True):
         axes.plot(times / late, speed / size, label=look.label, **look.style)
     name = "velocity" if solution.dimension == 1 else "speed"
-    if np.nanmin(every) >= 0 and np.nanmin(every) < NEAR_REST * np.nanmax(every):
+    if 0 <= every.min(initial=np.inf) < NEAR_REST * every.max(initial=0.0):
         axes.set_ylim(bottom=0)
     axes.set_ylabel(f"{name} [{unit}]")
     axes.set_title(name.capitalize())
@@ -133,8 +134,9 @@ def _draw_speed(axes: Any, solution: MissionSolution, late: float) -> None:
 def _draw_turning(axes: Any, solution: MissionSolution, late: float) -> None:
     """How fast the body turns."""
     for leg, look in zip(solution.legs, looks_of(solution.legs), strict=True):
+        drawn = moments(leg)
         axes.plot(
-            leg.end_times / late, np.linalg.norm(np.asarray(leg.rate), axis=1), label=look.label, **look.style
+            drawn.time / late, np.linalg.norm(np.asarray(drawn.rate), axis=1), label=look.label, **look.style
         )
     axes.set_ylim(bottom=0)
     axes.set_ylabel("rate [rad/s]")

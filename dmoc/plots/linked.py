@@ -11,7 +11,7 @@ from dmoc.configurations.of_problem import configuration_of
 from dmoc.links.along import states_of
 from dmoc.links.joint import room
 from dmoc.plots.path import entries_once
-from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, readable, within_steps
+from dmoc.plots.style import CHANNEL_COLOURS, CHANNEL_LINES, DARK, LIMIT, PALE, moments, readable, within_steps
 from dmoc.plots.surroundings import draw_scene
 from dmoc.plots.turning import paths_of_points
 from dmoc.results.solution import Solution
@@ -203,15 +203,13 @@ def reaction_names(solution: Solution) -> list[str]:
 
 
 def draw_speeds(axes: Any, solution: Solution, late: float) -> None:
-    """The speed of each body at the step ends."""
+    """The speed of each body."""
     made = solution.path.coordinates
     bodies = list(dict.fromkeys(block.body for block in made.blocks))
-    speeds = {
-        body: np.linalg.norm(solution.velocity[:, made.of_body(body)[1][made.speeds]], axis=1)
-        for body in bodies
-    }
+    drawn = moments(solution)
+    speeds = {body: np.linalg.norm(drawn.of(body)[1], axis=1) for body in bodies}
     size, unit = readable(np.concatenate(list(speeds.values())), "m/s")
     for i, (body, speed) in enumerate(speeds.items()):
-        axes.plot(solution.end_times / late, speed / size, label=body or "|v|", **_look(i))
+        axes.plot(drawn.time / late, speed / size, label=body or "|v|", **_look(i))
     axes.set_ylabel(f"speed [{unit}]")
     axes.set_title("Speed of each body" if len(speeds) > 1 else "Speed")

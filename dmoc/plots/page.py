@@ -201,15 +201,17 @@ def draw_speed(axes: Any, solution: Solution, late: float) -> None:
     size, unit = readable(speed, "m/s")
     name = "velocity" if solution.dimension == 1 else "speed"
     axes.plot(times / late, speed / size, color=PATH, label=name)
+    known = speed[np.isfinite(speed)]
+    least, most = known.min(initial=np.inf), known.max(initial=0.0)
     # Rest is no way back, whatever the sign of its rounding error.
-    back = np.nanmin(speed) < -1e-6 * np.nanmax(np.abs(speed))
+    back = least < -1e-6 * np.abs(known).max(initial=0.0)
     limits = solution.problem.constraints if solution.problem else ()
     # The speed is that of the centre of mass.
     for constraint in [one for one in limits if not one.turns_body and one.point is None and not one.on]:
         if (limit := constraint.largest_speed()) is not None:
             for side in (limit, -limit) if back else (limit,):
                 axes.axhline(side / size, label="limit", **LIMIT)
-    if not back and np.nanmin(speed) < 0.5 * np.nanmax(speed):
+    if not back and least < 0.5 * most:
         # A speed that never falls by half is drawn without the zero, so that its small changes can be seen.
         axes.set_ylim(bottom=0)
     axes.set_ylabel(f"{name} [{unit}]")

@@ -12,6 +12,7 @@ from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.march import wrench_of
 from dmoc.motion.mesh import step_nodes
+from dmoc.results.moments import Moment, sampled
 from dmoc.results.solution import Solution
 
 # Colours are those of Okabe and Ito's palette, which stay apart under the common kinds of colour blindness.
@@ -128,24 +129,18 @@ def flown_control(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return solution.provenance.start_time + solution.duration * fractions, control
 
 
+def moments(solution: Solution) -> Moment:
+    """The answer at the step ends and, above order 2, at times between them close enough to draw."""
+    within = 1 if scheme(solution.order).degree == 1 else int(np.clip(POINTS // solution.steps, 1, MOST_WITHIN))
+    times = _times(solution, np.arange(within) / within)
+    return sampled(solution, np.append(times, solution.end_times[-1]))
+
+
 def speeds(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and speeds [m/s] at the step ends, and above order 2 at the Gauss points between.
-
-    On a line they are velocities, whose sign tells forward from back.
-
-    Elsewhere inside a step the derivative of its polynomial is less accurate than the path.
-    """
-    rule, times, velocity = scheme(solution.order), solution.end_times, solution.velocity
-    if rule.degree > 1:
-        points = rule.gauss_points()
-        nodes = solution.position[step_nodes(solution.steps, rule)]
-        h = np.diff(solution.end_times)[:, None, None]
-        inside = np.einsum("pj,jkn->kpn", rule.slopes_at(points), nodes - nodes[0]) / h
-        times = np.append(times, _times(solution, points))
-        velocity = np.concatenate([velocity, inside.reshape(-1, solution.dimension)])
-    order = np.argsort(times, kind="stable")
-    along = velocity[:, 0] if solution.dimension == 1 else np.linalg.norm(velocity, axis=1)
-    return times[order], along[order]
+    """Times [s] and speeds [m/s], close enough to draw; on a line with their sign, forward or back."""
+    drawn = moments(solution)
+    alone = drawn.velocity.shape[1] == 1
+    return drawn.time, drawn.velocity[:, 0] if alone else np.linalg.norm(drawn.velocity, axis=1)
 
 
 def _times(solution: Solution, fractions: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from dmoc.plots.style import (
     PATH,
     PUSH,
     flown_control,
+    moments,
     readable,
     within_steps,
 )
@@ -186,15 +187,16 @@ def _draw_firings(axes: Any, times: np.ndarray, control: np.ndarray, unit: str) 
 
 
 def draw_rates(axes: Any, solution: Solution, late: float) -> None:
-    """Angular rates in body axes at the step ends, and their limit."""
-    ends, rates = solution.end_times / late, solution.rate
+    """Angular rates in body axes, and their limit."""
+    drawn = moments(solution)
+    times, rates = drawn.time / late, drawn.rate
     assert rates is not None
     size, unit = (1.0, "rad/s") if np.abs(rates).max(initial=0.0) > 1e-2 else (1e-3, "mrad/s")
     for i, name in enumerate("xyz"):
         style = {"color": AXIS_COLOURS[i], "linestyle": AXIS_LINES[i], "linewidth": 1.8}
-        axes.plot(ends, rates[:, i] / size, label=f"$\\omega_{name}$", **style)
+        axes.plot(times, rates[:, i] / size, label=f"$\\omega_{name}$", **style)
     axes.plot(
-        ends, np.linalg.norm(rates, axis=1) / size, color=DARK, linestyle=(0, (1, 1)), label="$|\\omega|$"
+        times, np.linalg.norm(rates, axis=1) / size, color=DARK, linestyle=(0, (1, 1)), label="$|\\omega|$"
     )
     for constraint in solution.problem.constraints if solution.problem else ():
         if constraint.unit == "rad/s" and (limit := constraint.largest_speed()) is not None:
@@ -204,11 +206,12 @@ def draw_rates(axes: Any, solution: Solution, late: float) -> None:
 
 
 def draw_wheels(axes: Any, solution: Solution, late: float) -> None:
-    """Angular momenta of reaction wheels at the step ends, and the most that they store."""
-    held = solution.wheel_momentum
+    """Angular momenta of reaction wheels, and the most that they store."""
+    drawn = moments(solution)
+    held = drawn.wheel_momentum
     assert held is not None
     for i, values in enumerate(held.T):
-        axes.plot(solution.end_times / late, values, label=f"wheel{i + 1}", **_channel(i))
+        axes.plot(drawn.time / late, values, label=f"wheel{i + 1}", **_channel(i))
     largest = float(np.abs(held).max(initial=0.0))
     for constraint in solution.problem.constraints if solution.problem else ():
         if constraint.unit == "N m s" and (limit := constraint.largest_speed() or 0.0) <= 4 * largest:

@@ -232,7 +232,7 @@ class Ladder:
         near = in_tube(problem, guess)
         onward = barrier_from(problem, guess) | limits
         if near is not None and (tubed := self._attempt(guess, near, HALFWAY | limits)).solved:
-            guess, onward = out_of_tube(tubed.path), FROM_HALFWAY | limits
+            guess, onward = out_of_tube(tubed.path), limits | FROM_HALFWAY
         here = partial(self._attempt, problem=problem, limits=onward)
         return led(here(guess), self.ask, problem, guess, here)
 

@@ -104,7 +104,8 @@ def _solved(
         rung, first = on_shorter_steps(ladder, rung, first, given)
 
     def mended(rung: Rung) -> Rung:
-        rung = past_zones(ladder, rung, first, given, is_open)
+        # Of an answer that need not be sharp only the way past the zones counts.
+        rung = past_zones(ladder, rung, first, given, is_open or not sharp)
         if is_open:
             rung = onto_goal(ladder, rung, first, given, order, pinned)
             rung = onto_price(ladder, rung, pinned)

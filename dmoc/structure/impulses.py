@@ -16,9 +16,10 @@ import numpy as np
 from dmoc.chains.path import MissionPath, merged
 from dmoc.checks.primer import HELPS, worth_of
 from dmoc.missions.solution import MissionSolution
+from dmoc.motion.lobatto import scheme
+from dmoc.motion.path import DiscretePath
 from dmoc.scene.impulses import FEWER, MORE, with_impulse, without_impulse
 from dmoc.scene.mission import Mission
-from dmoc.structure.pieces import cut
 from dmoc.structure.solution import changed_solution
 
 # There are no more than so many impulses.
@@ -27,6 +28,8 @@ MOST_IMPULSES = 8
 FIRST_SIZE = 0.02
 # An impulse below this part of all together is taken away [-].
 NO_SIZE = 1e-5
+# A cut so near to a step end, as a part of the steps beside it, is made there [-].
+SNAP = 0.2
 # Another impulse must save at least this part of the objective [-].
 WORTH = 1e-7
 
@@ -135,3 +138,36 @@ def _merged(found: MissionSolution, joint: int) -> tuple[Mission, MissionPath]:
     begins = (*path.begins[:joint], *path.begins[joint + 1 :])
     new = MissionPath((*path.legs[: joint - 1], one, *path.legs[joint + 1 :]), begins, own, near=True)
     return without_impulse(mission, joint), new
+
+
+def cut(path: DiscretePath, fraction: float) -> tuple[DiscretePath, DiscretePath]:
+    """A path in two parts, without multipliers; the cut is a step end of both."""
+    steps, rule = np.diff(path.mesh), scheme(path.order)
+    near = int(np.argmin(np.abs(path.mesh - fraction)))
+    if 0 < near < len(steps) and abs(path.mesh[near] - fraction) < SNAP * steps[near - 1 : near + 1].min():
+        fraction = float(path.mesh[near])
+    mesh = np.unique(np.append(path.mesh, fraction))
+    fine, k = path.onto(mesh, path.order, path.hold), int(np.searchsorted(mesh, fraction))
+    node, control = k * rule.degree, k if path.hold else k * rule.degree
+    slopes = np.gradient(fine.position, fine.duration * fine.fractions, axis=0)[node]
+    first = replace(
+        fine,
+        mesh=mesh[: k + 1] / fraction,
+        duration=fraction * path.duration,
+        position=fine.position[: node + 1],
+        control=fine.control[: control + (not path.hold)],
+        mass=fine.mass[: node + 1],
+        goal_velocity=slopes,
+        multipliers={},
+    )
+    last = replace(
+        fine,
+        mesh=(mesh[k:] - fraction) / (1 - fraction),
+        duration=(1 - fraction) * path.duration,
+        position=fine.position[node:],
+        control=fine.control[control:],
+        mass=fine.mass[node:],
+        start_velocity=slopes,
+        multipliers={},
+    )
+    return first, last

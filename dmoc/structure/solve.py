@@ -10,51 +10,45 @@ import numpy as np
 
 from dmoc.basics.memory import unchanged
 from dmoc.checks.verification import Report
-from dmoc.meshes.choices import TRIAL_ORDER, TRIAL_STEPS, first_path
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
 from dmoc.missions.climb import NEARER, STAYING, Climb
 from dmoc.missions.solution import MissionSolution
-from dmoc.results.solution import OUT_OF_TIME, Solution
+from dmoc.results.solution import Solution
 from dmoc.rungs.rung import cut_short
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.solve import check_numerics, solve
+from dmoc.solver.solve import check_numerics
 from dmoc.structure.arcs import (
     Arc,
     alike,
     arcs_of,
     can_be_parted,
     is_clear,
-    is_switched,
     plain,
     surely_seen,
     told,
     without_waiting,
 )
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
+from dmoc.structure.coarse import ENDED, LESS_ROUNDED, ROUNDED, coarse_answer
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
-# |F| is rounded at zero over this part of the largest thrust [-] in the coarse answer, over the second one
-# if an arc is hardly there, over the third in a second coarse answer: where the fuel hardly depends on
-# where it burns, a wide rounding hides short burns.
-WIDE, ROUNDED, LESS_ROUNDED = 1e-2, 1e-3, 1e-4
-# The coarse answer has this many steps at these orders, if no number is given and the motion needs no more.
-COARSE_STEPS = {2: 60, 4: 30}
 # A second coarse answer has so many times the steps.
 FINER = 3
 # Without a tolerance the objective may change by this part of it on the last meshes [-]: more says that
 # something switches inside a leg.
 SETTLED = 1e-6
-# The status of what the user or the time ended.
-ENDED = ("stopped", OUT_OF_TIME)
 # Arcs are improved so many times.
 MOST_ROUNDS = 10
 # How near to limits Ipopt begins from nearly the answer, and with which parameter of the barrier [-]; where the
 # first leads nowhere the second is tried.
 NEAR = (1e-9, 1e-6), (1e-4, 1e-2)
+# With an arc more the answer is further away: held as near as before, `two_body_fuel` takes 78 iterations
+# to move its shortest burn, not 28 [-].
+GROWING = 100.0
 # An answer that costs more than the coarse one by over this part of it [-] is another optimum, or none.
 WORSE = 0.1
 # Without the coasts at its ends an answer may cost this part more [-], as much as the coarse mesh is off.
@@ -173,32 +167,6 @@ def _is_settled(found: MissionSolution, coarse: int) -> bool:
     return abs(same[-1].objective - same[-2].objective) <= SETTLED * abs(last.objective)
 
 
-def coarse_answer(
-    problem: TransferProblem, order: int | None, steps: int | None, rounded: float = WIDE, **more: Any
-) -> Solution:
-    """An answer that is good enough to see the arcs in, |F| `rounded` at zero over that part of its limit."""
-    engine: Any = problem.actuator
-    if engine.smoothing is not None and engine.smoothing < rounded:
-        problem = replace(problem, actuator=replace(engine, smoothing=rounded))
-    if order is None and steps is None:
-        wanted = first_path(problem, guess=more.get("guess"))
-        order, steps = wanted.order, len(wanted.mesh) - 1
-        if order <= FOUND_ORDER:
-            # On a singular arc forces of order 2 do not chatter.
-            order = 2 if engine.smoothing is None and is_switched(problem) else FOUND_ORDER
-            steps = COARSE_STEPS[order]
-        fixed = bool(problem.constraints) and not problem.free_duration
-        if order == TRIAL_ORDER and fixed and more.get("guess") is None:
-            # Around zones there are several optima: a solve to a tolerance begins so, and leads to the same.
-            trial = solve(problem, order, TRIAL_STEPS, sharp=False, **more)
-            if trial.success:
-                found = solve(problem, order, steps, sharp=False, **more | {"guess": trial.path})
-                return replace(found, ladder=(*trial.ladder, *found.ladder)) if found.success else trial
-            if trial.status in ENDED:
-                return trial
-    return solve(problem, order, steps, sharp=False, **more)
-
-
 def verdict(found: MissionSolution) -> Report:
     """The judgement of the independent checks."""
     return verify_mission(found)
@@ -272,6 +240,8 @@ def _settled(
         better = improved(problem, arcs, found)
         if alike(better, arcs):
             return better, attempt, found
+        if len(better) > len(arcs):
+            climb.staying = max(climb.staying, GROWING)
         arcs, legs = better, found.legs
     return None
 

@@ -54,7 +54,9 @@ def touched(problem: TransferProblem, path: DiscretePath, least: float) -> dict[
         density = path.multipliers.get(Key("node", "row", title(constraint, i)))
         for row in range(0 if density is None else density.shape[1]):
             column = density[:, row]  # type: ignore[index]
-            note(Surface(i, row, upper=bool(column[np.argmax(np.abs(column))] > 0)), np.abs(column), 1.0)
+            surface = Surface(i, row, upper=bool(column[np.argmax(np.abs(column))] > 0))
+            if np.isfinite(room(problem, path, surface, path.fractions[:1], path.position[:1])).all():
+                note(surface, np.abs(column), 1.0)
     walls = path.multipliers.get(POSITION_BOUNDS)
     boxes = [constraint.bounds(problem.dimension) for constraint in problem.constraints]
     for axis in range(0 if walls is None else walls.shape[1]):
@@ -177,6 +179,7 @@ class Tangent(Event):
 
     constraint: Constraint
     surface: Surface
+    keeps_energy = True
 
     def passed(self, here: Instant, own: Any, speeds: np.ndarray, tiny: float) -> Passed:
         sizes = here.q.numel(), here.v.numel()

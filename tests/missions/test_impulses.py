@@ -15,7 +15,7 @@ from dmoc.legs.lambert import lambert
 from dmoc.missions.arcs import cheapest_arc
 from dmoc.missions.checks import primer_check
 from dmoc.scene.problem_file import load_problem
-from dmoc.structure.pieces import cut
+from dmoc.structure.impulses import cut
 
 # Places, duration, whole revolutions, whether about +z, whether the slower one, and both velocities, for
 # mu = 1, by `izzo2015` of lamberthub 1.0.0 (J. Martinez Garrido, 2021) with tolerances of 1e-12.

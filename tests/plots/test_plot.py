@@ -402,6 +402,15 @@ def test_on_a_line_the_velocity_is_drawn_with_its_sign():
     assert forth.get_ylim()[0] == 0 and forth.get_ylabel() == "velocity [m/s]"
 
 
+def test_a_speed_is_a_smooth_curve_on_few_steps():
+    """Between nodes it is the speed of the answer there, not a straight line."""
+    solution = solve(orbit(), order=8, steps=4)
+    (curve,) = [line for line in panels(solution)["speed"].lines if line.get_label() == "speed"]
+    times, speed = curve.get_data()
+    assert len(times) > 100
+    np.testing.assert_allclose(speed, np.linalg.norm(solution.at(times).velocity, axis=1), rtol=1e-12)
+
+
 def test_nozzles_are_limited_one_by_one():
     nozzles = Nozzles([(1, 0), (-1, 0), (0, 1), (0, -1)], 1.5)
     solution = solve(room(actuator=nozzles, constraints=()), steps=10)

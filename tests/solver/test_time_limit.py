@@ -8,7 +8,7 @@ from dmoc import load, solve
 from dmoc.cli.app import main
 from dmoc.ipopt import run as ipopt
 from dmoc.scene.problem_file import load_problem
-from dmoc.structure.solve import coarse_answer
+from dmoc.structure.coarse import coarse_answer
 
 
 class Clock:

@@ -29,9 +29,10 @@ from dmoc.scene.problem_file import load_problem
 from dmoc.structure import solve as structure
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain, surely_seen
 from dmoc.structure.build import mission_of, path_of
+from dmoc.structure.coarse import coarse_answer
 from dmoc.structure.improve import improved
 from dmoc.structure.modes import FREE
-from dmoc.structure.solve import NEAR, coarse_answer, solve_by_structure
+from dmoc.structure.solve import NEAR, solve_by_structure
 from dmoc.structure.surfaces import Surface
 
 # Two local optima of the free-flyer, on either side of the obstacles.
