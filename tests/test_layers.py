@@ -23,6 +23,7 @@ LAYERS = [
     ["legs"],
     ["scene"],
     ["motion"],
+    ["shots"],
     ["guess", "results", "flights"],
     ["ipopt"],
     ["assembly"],

@@ -10,11 +10,10 @@ import numpy as np
 
 from dmoc.basics.arguments import LARGEST, short
 from dmoc.guess.around import path_around, shortest_flyable
-from dmoc.guess.coast import VERY_MANY_TURNS, controls_for
-from dmoc.guess.extremal import least_effort
-from dmoc.guess.flyby import least_effort_past
+from dmoc.guess.coast import controls_for
 from dmoc.guess.open_ends import end_estimates, spiral_between, spiral_change
 from dmoc.guess.past_zones import off_centres, off_saddles
+from dmoc.guess.shot import LIKELY, shot_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, node_weights, step_nodes
@@ -58,13 +57,13 @@ def starting_guess(
         if given.control.shape[1] != problem.controls:
             given = _of_other_controls(problem, given, force)
         return given.onto(mesh, order, hold)
-    fractions = node_fractions(mesh, scheme(order))
+    fractions, asked = node_fractions(mesh, scheme(order)), duration
     duration = duration or guess_duration(problem)
     linked = problem.links or problem.system is not None
     if given is None and not linked:
-        for found in (_least_effort, _past_attractors):
-            if (best := found(problem, mesh, order, hold, duration)) is not None:
-                return best
+        best = shot_guess(problem, mesh, order, hold, duration, asked is None)
+        if best is not None:
+            return best
     places = len(mesh) - 1 if hold else len(fractions)
     control, spiral, ends = np.zeros((places, problem.controls)), False, ()  # type: tuple[Any, bool, Any]
     made_of = None
@@ -91,80 +90,6 @@ def starting_guess(
     guess = replace(DiscretePath(mesh, order, hold, duration, position, control, mass, *ends), made_of=made_of)
     guess = off_centres(problem, guess)
     return replace(guess, control=_force_along(problem, guess)) if spiral else guess
-
-
-def _least_effort(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
-) -> DiscretePath | None:
-    """Very many revolutions from a known state to an open place on an orbit, at the least effort.
-
-    A guess that does not meet the equations of motion so well is many revolutions off at the end, and over
-    hundreds of them Ipopt does not find the way back.
-    """
-    start = problem.start.fixed()[0][None]
-    if problem.attraction.lone is None or np.isnan(start).any():
-        return None
-    if duration * problem.attraction.rates(start)[0] < 2 * np.pi * VERY_MANY_TURNS:
-        return None
-    return least_effort_to_orbit(problem, mesh, order, hold, duration)
-
-
-def least_effort_to_orbit(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
-) -> DiscretePath | None:
-    """The path of least effort from a known state to an open place on an orbit; None if none is found."""
-    attractor, start = problem.attraction.lone, problem.start.fixed()
-    # Only where the controls are the force, or the force and its magnitude, are they known from the force.
-    more = problem.actuator.labels(problem.dimension)[problem.dimension :]
-    # Shots see the conditions of the goal, not numbers that it fixes.
-    other = problem.goal.anchored or np.isnan(start).any() or not np.isnan(problem.goal.fixed()).all()
-    if attractor is None or problem.constraints or problem.links or other or more not in ((), ("throttle",)):
-        return None
-    path = least_effort(problem, duration, start)
-    if path is None:
-        return None
-    position, velocity, force, mass = path(node_fractions(mesh, scheme(order)))
-    position[0] = start[0]
-    control = _controls_of(problem, force, mesh, order, hold)
-    if control is None:
-        return None
-    return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])
-
-
-def _past_attractors(
-    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
-) -> DiscretePath | None:
-    """The path of least effort between two known states past several attractors, in a known duration.
-
-    Coasts that are blended may pass an attractor on the wrong side, where hundreds of times the effort are
-    needed.
-    """
-    attraction, ends = problem.attraction, (problem.start, problem.goal)
-    times = problem.start_time, problem.start_time + duration
-    states = tuple(end.estimate(at) for end, at in zip(ends, times, strict=True))
-    several = len(attraction.sources) > 1 and problem.dimension > 1
-    if not several or problem.free_duration or np.isnan(states).any():
-        return None
-    path = least_effort_past(problem, duration, states)
-    if path is None:
-        return None
-    position, _, force = path(node_fractions(mesh, scheme(order)))
-    position[[0, -1]] = states[0][0], states[1][0]
-    control = _controls_of(problem, force, mesh, order, hold)
-    if control is None:
-        control = np.zeros((len(mesh) - 1 if hold else len(position), problem.controls))
-    mass = np.full(len(position), problem.mass)
-    return DiscretePath(mesh, order, hold, duration, position, control, mass, states[0][1], states[1][1])
-
-
-def _controls_of(
-    problem: TransferProblem, force: np.ndarray, mesh: np.ndarray, order: int, hold: bool
-) -> np.ndarray | None:
-    """The controls that give forces at the nodes of a mesh [N]; held ones their mean in each step."""
-    if hold:
-        rule = scheme(order)
-        force = np.einsum("j,jkn->kn", rule.weights, force[step_nodes(len(mesh) - 1, rule)])
-    return controls_for(problem, force)
 
 
 def angle_around(problem: TransferProblem, guess: DiscretePath) -> float:
@@ -223,7 +148,7 @@ def guess_duration(problem: TransferProblem) -> float:
         needed = max(2 * np.sqrt(spiral.climb / acceleration), change / acceleration)
     else:
         needed = 2 * np.sqrt(np.linalg.norm(q1 - q0) / acceleration) + np.linalg.norm(v1 - v0) / acceleration
-    return float(np.clip(1.2 * needed, shortest, longest)) if needed > 0 else middle
+    return float(np.clip(LIKELY * needed, shortest, longest)) if needed > 0 else middle
 
 
 def _of_other_controls(problem: TransferProblem, given: DiscretePath, force: np.ndarray | None) -> DiscretePath:

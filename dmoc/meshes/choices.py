@@ -26,6 +26,8 @@ DEFAULT_STEPS = {2: 400, 4: 100, 6: 50, 8: 32}
 # by the root of the number of revolutions, since errors of the phase add up: after n revolutions in N steps the
 # goal of `geo_raise` is missed by 141 n^3 / N^2 of the path.
 A_TURN = {2: 150, 4: 40, 6: 20, 8: 12}
+# Where the force is the largest throughout nothing switches, and fewer do.
+A_TURN_AT_FULL = {8: 8}
 # A fall past one of several attractors gets this many steps a radian at each order, and no more than that in
 # all: on half as many Ipopt wanders off from the path of least effort itself, on these it stays, in 2 to 5
 # iterations.
@@ -69,11 +71,6 @@ IN_PHASE = 50
 # A coarse mesh of higher order has at least this many steps a revolution where there are very many: with fewer
 # its optima are others.
 COARSE_TURN = {4: 16, 6: 10, 8: 6}
-# The rounding of |F| on the coarsest mesh is this part of the largest thrust [-].
-WIDEST_ROUNDING = 1e-2
-# Where propellant burns that no cost counts it is this part: to burn more is then a gain, and from a narrower
-# one Ipopt wanders at the node in which the thrust is reversed.
-WIDEST_UNPAID = 0.3
 
 # A solve to a tolerance begins with a trial of this order, if none is asked for.
 TRIAL_ORDER = 4
@@ -120,9 +117,8 @@ def first_path(
     if steps is None and turns > MANY_TURNS:
         many = ORDER_OF_MANY_TURNS if turns < MOST_TURNS_OF_ORDER_6 else ORDER_OF_MORE_TURNS
         order = order or (2 if hold else many)
-        steps = max(
-            DEFAULT_STEPS[order], int(turns * A_TURN[order] * (errors_add_up**0.5 if order == 2 else 1))
-        )
+        a_turn = A_TURN_AT_FULL.get(order, A_TURN[order]) if is_full(problem, first) else A_TURN[order]
+        steps = max(DEFAULT_STEPS[order], int(turns * a_turn * (errors_add_up**0.5 if order == 2 else 1)))
         first = starting_guess(problem, check_mesh(steps), order, hold, guess)
     if is_uneven(problem, first):
         if order is None:
@@ -132,6 +128,12 @@ def first_path(
         enough = max(DEFAULT_STEPS[order], steps_past(problem, first, order))
         return graded_guess(problem, steps or enough, order, hold, guess)
     return first
+
+
+def is_full(problem: TransferProblem, guess: DiscretePath) -> bool:
+    """Whether the force of a guess is as large as it may be all along."""
+    limit, force = problem.actuator.force_limit(), guess.control[:, : problem.dimension]
+    return limit is not None and bool(np.isclose(np.linalg.norm(force, axis=1), limit).all())
 
 
 def _unstable_angle(problem: TransferProblem, guess: DiscretePath) -> float:
@@ -252,19 +254,6 @@ def fastest_rates(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
     # A mode that dies out need not be followed.
     return np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
-
-
-def rounding_stages(
-    meshes: list[np.ndarray], problem: TransferProblem
-) -> list[tuple[np.ndarray, float | None]]:
-    """The meshes, each with the rounding of |F| at zero: wide on the coarse ones, as asked for on the last."""
-    if (rounding := problem.actuator.smoothing) is None:
-        return [(mesh, None) for mesh in meshes]
-    widest = WIDEST_UNPAID if burns_unpaid(problem) else WIDEST_ROUNDING
-    count = max(int(np.ceil(np.log10(widest / rounding))), 0)
-    widths = [widest * 0.1**i for i in range(count)] + [rounding]
-    repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
-    return list(zip(repeated, widths + [rounding] * (len(meshes) - len(widths)), strict=True))
 
 
 def best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:

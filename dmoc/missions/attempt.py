@@ -11,6 +11,8 @@ from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.ipopt.run import Answer
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.reference import goal_miss
+from dmoc.motion.scales import path_scales
 from dmoc.nlp.units import outgrown
 from dmoc.results.estimate import local_errors
 from dmoc.results.facts import Level
@@ -53,6 +55,15 @@ class Attempt:
     def largest_error(self) -> float:
         """The error that the steps of a leg add up to, of the worst leg and of the path [-]."""
         return max(float(each.sum()) for each in self.errors)
+
+    @property
+    def missed(self) -> float:
+        """By how much the independent integrator misses the goal of a leg, of the worst one [-]."""
+        path = self.path
+        legs = zip(self.program.mission.stretches, path.legs, path.begins, strict=True)
+        return max(
+            path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)) for problem, leg, begin in legs
+        )
 
     def to_cut(self, accurate: float) -> list[np.ndarray]:
         """The errors by which steps are cut: all alike where what is left is in no step more than in others."""

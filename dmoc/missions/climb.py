@@ -13,16 +13,13 @@ from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Interrupt, Watch
-from dmoc.meshes.choices import WIDEST_ROUNDING
+from dmoc.meshes.widths import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
 from dmoc.missions.sharper import onto_magnitude
 from dmoc.missions.solution import MissionSolution
-from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.reference import goal_miss
-from dmoc.motion.scales import path_scales
 from dmoc.results.estimate import left_after
 from dmoc.results.facts import Error, Level
 from dmoc.rungs.rung import settled
@@ -63,6 +60,8 @@ class Climb:
     sharp = False
     # How near attempts from nearly the answer stay to it.
     staying = STAYING
+    # Meshes are refined until there was so much work.
+    most_work = np.inf
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 
@@ -75,6 +74,11 @@ class Climb:
         self.held: Attempt | None = None
         # What is in the way, where no attempt succeeded, and what another start led to.
         self.reason = self.told = ""
+
+    @property
+    def work(self) -> int:
+        """Iterations times steps so far, which take about equally long."""
+        return sum(level.iterations * level.steps for level in self.levels)
 
     def solve(self, path: MissionPath, tol: float | None, given: bool) -> Any:
         """From a path to the answer; on its meshes alone if these are given and there is no tolerance."""
@@ -114,8 +118,7 @@ class Climb:
     def attempt(self, path: MissionPath, *args: Any, **how: Any) -> Attempt:
         """Solve on the meshes of a path, and again where the answer hardly takes the force of its units."""
         made = self._run(path, *args, **how)
-        near = how.get("near") is not None
-        return made if near else settled(made, lambda found: self._run(found, *args, **how))
+        return made if how.get("near") else settled(made, lambda found: self._run(found, *args, **how))
 
     def _run(
         self,
@@ -238,14 +241,13 @@ class Climb:
         """
         error: Error | None = None
         changes: list[float] = []
-        few = tol is None and np.isinf(still)
-        for _ in range(MOST_MENDED if few else MOST_MESHES):
+        for _ in range(MOST_MENDED if tol is None and np.isinf(still) else MOST_MESHES):
             rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
             # Of arcs nothing is left to be found, but in other missions errors tell where limits set in.
             onto = attempt.path.finer(attempt.to_cut(tol or accurate) if self.sharp else attempt.errors)
-            if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS:
+            if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS or self.work > self.most_work:
                 break
             found = self.on_finer(onto)
             if found.answer.status == "stopped":
@@ -272,10 +274,7 @@ class Climb:
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
-        path, missed = attempt.path, 0.0
-        for problem, leg, begin in zip(self.mission.stretches, path.legs, path.begins, strict=True):
-            missed = max(missed, path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)))
-        return Error(summed, left_after(changes), missed)
+        return Error(summed, left_after(changes), attempt.missed)
 
 
 def solve_mission(

@@ -251,6 +251,11 @@ class Actuator(Duties):
         """The actuator that keeps exactly to some `limit_names`: -1 the lower one, 1 the upper, 0 none."""
         raise ValueError(f"{type(self).__name__} has no limits to keep to")
 
+    @property
+    def throughout(self) -> Actuator | None:
+        """The one that acts with its largest force throughout, in any direction; None where there is none."""
+        return None
+
     def beyond(self, u: np.ndarray) -> np.ndarray:
         """By how much controls between nodes are beyond what it can do [N], shape (count,).
 

@@ -140,6 +140,10 @@ class Engine(Burner):
     def force_limit(self) -> float:
         return self.max_thrust
 
+    @property
+    def throughout(self) -> Engine | None:
+        return None if self.box is not None else replace(self, min_thrust=self.max_thrust)
+
     def times(self, factor: float) -> Engine:
         box = None if self.box is None else times_each(self.box, factor)
         return replace(self, max_thrust=factor * self.max_thrust, box=box)

@@ -140,11 +140,15 @@ class BallForce(Actuator):
     def limit_names(self, dimension: int) -> tuple[tuple[str, str], ...]:
         return (("", "full force"),)
 
-    def kept(self, sides: Sequence[int]) -> Actuator:
+    def kept(self, sides: Sequence[int]) -> BallForce:
         return replace(self, full=bool(sides[0]))
 
     def force_limit(self) -> float:
         return self.limit
+
+    @property
+    def throughout(self) -> BallForce:
+        return self.kept((1,))
 
     def times(self, factor: float) -> BallForce:
         return replace(self, limit=factor * self.limit)

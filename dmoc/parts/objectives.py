@@ -60,6 +60,8 @@ class Objective(Duties):
     unit: ClassVar[str] = ""
     sense: ClassVar[int] = 1
     metered: ClassVar[bool] = False
+    # Whether it is the duration alone: of a limited force the largest is then best.
+    hurries: ClassVar[bool] = False
     adjustable: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -165,6 +167,7 @@ class Time(Objective):
     """Least time: the duration [s]. Needs a limited force and a duration given as (shortest, longest)."""
 
     unit: ClassVar[str] = "s"
+    hurries: ClassVar[bool] = True
 
     def running(self, t: Any, q: Any, v: Any, u: Any, m: Any) -> Any:
         return 1.0

@@ -12,7 +12,7 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.ipopt.run import STATUSES, Answer
-from dmoc.meshes.choices import WIDEST_ROUNDING, WIDEST_UNPAID
+from dmoc.meshes.widths import WIDEST_ROUNDING, WIDEST_UNPAID
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.units import outgrown

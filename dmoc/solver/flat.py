@@ -9,7 +9,7 @@ import numpy as np
 
 from dmoc.configurations.acting import state_symbols
 from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
-from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
+from dmoc.meshes.widths import WIDEST_ROUNDING, rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls

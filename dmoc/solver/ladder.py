@@ -16,7 +16,8 @@ from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
 from dmoc.ipopt.run import Interrupt
-from dmoc.meshes.choices import coarse_to_fine, rounding_stages
+from dmoc.meshes.choices import coarse_to_fine
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
@@ -27,6 +28,7 @@ from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
 from dmoc.results.switches import burns_unpaid
 from dmoc.rungs import rung as rungs
+from dmoc.rungs.full import at_full_force
 from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded, settled, told
 from dmoc.rungs.tube import FROM_HALFWAY, HALFWAY, around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
@@ -122,9 +124,8 @@ class Ladder:
             return rung
         shortest, longest = self.problem.duration_bounds
         if first.duration < longest:
-            longer = min(longest, LONGER * first.duration)
-            return self.solve_on(replace(first, duration=longer), rounding, most)
-        # The first guess was as long as may be: a target that moves may be met sooner.
+            return self.solve_on(replace(first, duration=min(longest, LONGER * first.duration)), rounding, most)
+        # The first guess was as long as may be: a moving target may be met sooner.
         for duration in np.geomspace(shortest, longest, 2 + SOONER)[-2:0:-1]:
             guess = starting_guess(self.problem, first.mesh, first.order, first.hold, None, duration)
             sooner = self.solve_on(guess, rounding, most)
@@ -174,9 +175,8 @@ class Ladder:
 
         With `lean` the answer is held near the guess, as strongly as `NLP.leaning` says.
         """
-        return self._attempt(
-            guess, rounded(self.problem, rounding), {"ipopt.max_iter": most}, pinned=pinned, lean=lean
-        )
+        problem, limits = rounded(self.problem, rounding), {"ipopt.max_iter": most}
+        return self._attempt(guess, problem, limits, pinned=pinned, lean=lean)
 
     def ask(
         self, problem: TransferProblem, guess: DiscretePath, question: str, most: int = MOST_TRYING
@@ -227,7 +227,8 @@ class Ladder:
             guess = replace(guess, multipliers={})
         # In the unknowns of a chart Ipopt does not leave the guess for other revolutions.
         if is_curved(problem, guess):
-            return self._attempt(guess, problem, limits)
+            curved = partial(self._attempt, guess, limits=limits)
+            return at_full_force(curved, problem, guess) or curved(problem)
         near = in_tube(problem, guess)
         onward = barrier_from(problem, guess) | limits
         if near is not None and (tubed := self._attempt(guess, near, HALFWAY | limits)).solved:

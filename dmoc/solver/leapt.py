@@ -10,7 +10,8 @@ import numpy as np
 from dmoc.diagnosis.cause import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
-from dmoc.meshes.choices import coarse_to_fine, rounding_stages
+from dmoc.meshes.choices import coarse_to_fine
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.results.between import Cut
 from dmoc.rungs.rung import Rung

@@ -10,8 +10,10 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
-from dmoc.guess.starting import guess_duration, least_effort_to_orbit, starting_guess
-from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
+from dmoc.guess.shot import least_effort_to_orbit
+from dmoc.guess.starting import guess_duration, starting_guess
+from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath

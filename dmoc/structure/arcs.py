@@ -21,6 +21,11 @@ from dmoc.structure.surfaces import Surface, touched
 
 # What the controls do in an arc.
 BURN, COAST, SINGULAR = "burn", "coast", "singular arc"
+# Where the way is along a zone, part of the thrust is what turns the path with the surface.
+PARTLY = "partial thrust"
+# Such an arc is a contact with more than this part of the thrust [-], and not all of it at more than so many
+# nodes.
+PART, MOST_FULL = 0.1, 2
 # A limit acts if loosening it by its own size would change the objective by this part of it [-].
 ACTS = 1e-5
 # A path follows a limit if that acts over more than this many steps; else it touches it.
@@ -84,7 +89,10 @@ def arcs_of(solution: Solution) -> tuple[Arc, ...]:
     marks: list[tuple[float, float, Surface]] = []
     least, step = ACTS * abs(solution.objective), 1.0 / (len(path.mesh) - 1)
     for surface, acts in touched(problem, path, least).items():
-        marks += [(*span, surface) for span in spans_of(path, acts)]
+        spans = spans_of(path, acts)
+        if is_switched(problem):
+            cuts, spans = _partly_on(problem, path, cuts, spans)
+        marks += [(*span, surface) for span in spans]
     kept = sped(problem, path, least)
     along = [(*span, surface) for surface, acts in kept.items() for span in spans_of(path, acts)]
     return _merged(_beside(cuts, along, step), sorted([*marks, *along]), step, kept)
@@ -117,6 +125,41 @@ def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, f
         part = before / (before - after) if before * after < 0 else 0.5
         found.append((str(kinds[node]), float(at[node] + part * (at[node + 1] - at[node]))))
     return [*found, (str(kinds[-1]), 1.0)]
+
+
+def _partly_on(
+    problem: TransferProblem, path: DiscretePath, cuts: list[tuple[str, float]], spans: list
+) -> tuple[list[tuple[str, float]], list]:
+    """Switches and contacts with a zone; in those with part of the thrust nothing switches.
+
+    A contact begins and ends halfway between two nodes.
+    """
+    share, at = control_shares(problem, path.control)[:, 0], path.fractions
+    found = []
+    for first, last in spans:
+        one, two = (int(np.searchsorted(at, end)) for end in (first, last))
+        mine = share[max(one - 1, 0) : two + 2]
+        if one > 0 and two < len(at) - 1 and mine.max() > PART and (mine > 1 - INSIDE).sum() <= MOST_FULL:
+            first, last = 0.5 * (at[one - 1] + at[one]), 0.5 * (at[two] + at[two + 1])
+            begins = [0.0, *(end for _, end in cuts)]
+            before = [
+                (kind, min(end, first))
+                for (kind, end), begin in zip(cuts, begins, strict=False)
+                if begin < first
+            ]
+            cuts = [*before, (PARTLY, last), *(cut for cut in cuts if cut[1] > last)]
+        found.append((float(first), float(last)))
+    return _without_slivers(cuts, 1.0 / (len(at) - 1)), found
+
+
+def _without_slivers(cuts: list[tuple[str, float]], spacing: float) -> list[tuple[str, float]]:
+    """Switches without burns beside a contact that are shorter than from node to node."""
+    left: list[tuple[str, float]] = []
+    for i, (kind, end) in enumerate(cuts):
+        beside = PARTLY in (left[-1][0] if left else "", cuts[i + 1][0] if i + 1 < len(cuts) else "")
+        if not (kind == BURN and beside and end - (left[-1][1] if left else 0.0) < spacing):
+            left.append((kind, end))
+    return left
 
 
 def _limits_kept(solution: Solution) -> list[tuple[str, float]]:
@@ -200,8 +243,9 @@ def _merged(
     follows: list[tuple[float, float, Surface]] = []
     for first, last, surface in marks:
         # Nothing keeps a coast at a limit: what looks like that is a touch.
-        long = last - first > FOLLOWED_STEPS * step and COAST not in _kinds_within(cuts, first, last)
-        if long or surface in kept:
+        kinds = _kinds_within(cuts, first, last)
+        long = last - first > FOLLOWED_STEPS * step and COAST not in kinds
+        if long or surface in kept or PARTLY in kinds:
             follows.append((first, last, surface))
             places += [(first, surface), (last, surface)]
         else:

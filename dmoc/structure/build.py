@@ -16,6 +16,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions
 from dmoc.motion.path import DiscretePath
 from dmoc.results.solution import Solution
+from dmoc.results.switches import linear_controls
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
@@ -77,8 +78,12 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
     if arc.kind == BURN:
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
-    # Where a speed is kept to, that says what the control is.
-    degree = SINGULAR_DEGREE if arc.kind == SINGULAR and not is_of_speed(problem, arc.follows) else None
+    # Where a speed is kept to along a line, that says what the control is; in a plane it may turn, and where no
+    # thrust is paid for nothing says how.
+    unpaid = bool(names_of(problem)) and bool(linear_controls(problem).all())
+    turning = problem.dimension > 1 and unpaid
+    singular = turning if is_of_speed(problem, arc.follows) else arc.kind == SINGULAR
+    degree = SINGULAR_DEGREE if singular else None
     sides = sides_of(problem, arc.kind)
     kept = problem.actuator.kept(sides) if any(sides) else None
     linear = names_of(problem) and not is_of_speed(problem, arc.follows)

@@ -10,10 +10,10 @@ import numpy as np
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
-from dmoc.structure.arcs import ACTS, BURN, COAST, Arc, is_switched, joined, spans_of
+from dmoc.structure.arcs import ACTS, BURN, COAST, PARTLY, Arc, is_switched, joined, spans_of
 from dmoc.structure.modes import lacking, names_of
 from dmoc.structure.speeds import is_of_speed, sped
-from dmoc.structure.surfaces import NEAR, pierced, room, touched
+from dmoc.structure.surfaces import NEAR, pierced, pulled, room, touched
 
 # A leg is empty if it lasts less than this many times its shortest duration.
 EMPTY = 1.5
@@ -23,9 +23,13 @@ WRONG = 1e-6
 DOUBT = 10.0
 # An arc between two touches of a limit is at it throughout if it is within this part of all the room [-].
 SAME = 1e-5
+# A zone pulls where a multiplier of its surface with the wrong sign is more than this part of the largest [-].
+PULLS = 0.1
 # A new arc begins with this part of the whole duration on either side of where that is furthest wrong [-]: a
 # longer one leads away from the answer so far.
 NEW = 1e-3
+# A new way along a zone begins with this part of it [-].
+TURNING = 1e-2
 
 
 def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSolution) -> tuple[Arc, ...]:
@@ -46,14 +50,14 @@ def improved(problem: TransferProblem, arcs: Sequence[Arc], found: MissionSoluti
     missing = [np.where(wrong > doubt, wrong, 0.0) for wrong in missing]
     for i, wrong in enumerate(missing):
         # At a switch the function is zero but for errors; at a touch of a burn or of a coast it need not be.
-        wrong[[0] * (i > 0 and _is_switch(*arcs[i - 1 : i + 1]))] = 0.0
-        wrong[[-1] * (i < len(missing) - 1 and _is_switch(*arcs[i : i + 2]))] = 0.0
+        wrong[[0] * (i > 0 and _is_zero(*arcs[i - 1 : i + 1]))] = 0.0
+        wrong[[-1] * (i < len(missing) - 1 and _is_zero(*arcs[i : i + 2]))] = 0.0
     worst = max((float(wrong.max()) for wrong in missing), default=0.0)
     for i, (arc, leg) in enumerate(zip(arcs, found.legs, strict=True)):
         begin = arcs[i - 1].end if i else 0.0
         # One more arc may be enough: what is wrong elsewhere is asked again with it.
         if worst and missing[i].max() == worst:
-            parts = _parted(arcs, i, found, missing[i])
+            parts = _turned(problem, arcs, i, found, missing[i]) or _parted(arcs, i, found, missing[i])
         else:
             parts = _touching(problem, arcs, i, leg, found.objective)
         more += [part._replace(end=begin + (arc.end - begin) * part.end) for part in parts] or [arc]
@@ -76,6 +80,16 @@ def _other_limits(
     parts = _parted(arcs, index, found, wrong, kind)
     scaled = [part._replace(end=begin + (arcs[index].end - begin) * part.end) for part in parts]
     return (*arcs[:index], *scaled, *arcs[index + 1 :])
+
+
+def is_pulled(arcs: Sequence[Arc], found: MissionSolution) -> bool:
+    """Whether a zone holds a path on its surface from which that should leave."""
+    stretches = found.require_problem().stretches
+    return any(
+        pulled(stretch.constraints[one.constraint], one.constraint, one, leg.path) > PULLS
+        for arc, leg, stretch in zip(arcs, found.legs, stretches, strict=True)
+        if (one := arc.follows) is not None and not stretch.constraints[one.constraint].limits_speed
+    )
 
 
 def settled(arcs: Sequence[Arc], found: MissionSolution) -> tuple[Arc, ...]:
@@ -160,6 +174,27 @@ def _parted(
     if peak == len(at) - 1:
         return [*before, other._replace(end=1.0, touches=arc.touches)]
     return [*before, other, arc._replace(end=1.0)]
+
+
+def _turned(
+    problem: TransferProblem, arcs: tuple[Arc, ...], index: int, found: MissionSolution, wrong: np.ndarray
+) -> list[Arc]:
+    """A coast with a way along the zone that it touches where it most lacks a burn; else nothing."""
+    arc, peak = arcs[index], int(np.argmax(wrong))
+    share = min(TURNING * found.duration / found.legs[index].duration, 0.5)
+    begin = arcs[index - 1].touches if index else None
+    if arc.kind != COAST or arc.follows:
+        return []
+    if peak == 0 and begin is not None and not is_of_speed(problem, begin):
+        return [Arc(PARTLY, share, begin, begin), arc._replace(end=1.0)]
+    if peak == len(wrong) - 1 and arc.touches is not None and not is_of_speed(problem, arc.touches):
+        return [arc._replace(end=1 - share), Arc(PARTLY, 1.0, arc.touches, arc.touches)]
+    return []
+
+
+def _is_zero(one: Arc, other: Arc) -> bool:
+    """Whether the switching function is zero between two arcs: where a burn, or part of the thrust, begins."""
+    return _is_switch(one, other) or {one.kind, other.kind} == {PARTLY, COAST}
 
 
 def _is_switch(one: Arc, other: Arc) -> bool:

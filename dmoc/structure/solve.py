@@ -24,6 +24,7 @@ from dmoc.structure.arcs import (
     alike,
     arcs_of,
     can_be_parted,
+    from_plain,
     is_clear,
     plain,
     surely_seen,
@@ -32,7 +33,7 @@ from dmoc.structure.arcs import (
 )
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.coarse import ENDED, LESS_ROUNDED, ROUNDED, coarse_answer
-from dmoc.structure.improve import improved
+from dmoc.structure.improve import improved, is_pulled
 from dmoc.structure.modes import FREE
 from dmoc.structure.solution import structured
 
@@ -150,7 +151,8 @@ def _by_arcs(
             continue
         if found.status in ENDED:
             return found
-        if found.optimal and _is_settled(found, len(coarse.ladder)) and verdict(found).ok:
+        sure = found.optimal and _is_settled(found, len(coarse.ladder))
+        if sure and not is_pulled(from_plain(found.arcs), found) and verdict(found).ok:
             return found
     return None
 
@@ -181,8 +183,10 @@ def _improved(
     iterations: int,
 ) -> MissionSolution | None:
     """The arcs of an answer on fine meshes, once no mesh shows that one is missing or in vain."""
-    spent = _work(climb)
+    spent = climb.work
     most = MOST_WORK + MOST_TIMES * spent
+    if tol is None:
+        climb.most_work = spent + most
     for _ in range(MOST_ROUNDS):
         settled = _settled(climb, problem, arcs, legs, (spent + most, iterations))
         if settled is None:
@@ -205,11 +209,6 @@ def _improved(
     return None
 
 
-def _work(climb: Climb) -> int:
-    """Iterations times steps so far, which take about equally long."""
-    return sum(level.iterations * level.steps for level in climb.levels)
-
-
 def _settled(
     climb: Climb,
     problem: TransferProblem,
@@ -225,7 +224,7 @@ def _settled(
         climb.mission = mission_of(problem, arcs)
         path = path_of(problem, arcs, legs)
         for near in NEAR:
-            if _work(climb) > most[0]:
+            if climb.work > most[0]:
                 return None
             attempt = climb.attempt(path, most=most[1], near=near)
             if attempt.solved or attempt.answer.status == "stopped":

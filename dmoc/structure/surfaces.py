@@ -68,6 +68,18 @@ def touched(problem: TransferProblem, path: DiscretePath, least: float) -> dict[
     return found
 
 
+def pulled(leg: Constraint, entry: int, surface: Surface, path: DiscretePath) -> float:
+    """By how much a limit that a leg follows pulls the path at its nodes [-]: it only may push it away.
+
+    The largest multiplier inside the leg with the sign of a pull, over the largest one.
+    """
+    rows = path.multipliers.get(Key("node", "row", title(leg, entry)))
+    if surface.row < 0 or rows is None or len(rows) < 3:
+        return 0.0
+    push = rows[1:-1, surface.row] * (1.0 if surface.upper else -1.0)
+    return float(np.maximum(-push, 0.0).max() / max(np.abs(push).max(), np.finfo(float).tiny))
+
+
 def _held(problem: TransferProblem, path: DiscretePath, surface: Surface, acts: np.ndarray) -> np.ndarray:
     """Nodes at a limit between two nodes where it acts: where no force is needed to stay, none acts between."""
     free = np.abs(room(problem, path, surface, path.fractions, path.position))

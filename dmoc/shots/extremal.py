@@ -137,12 +137,12 @@ class Shot:
     state_slopes: np.ndarray
     costate_slopes: np.ndarray
 
-    def correction(self, goal: ca.Function) -> tuple[np.ndarray, float, float]:
+    def correction(self, goal: ca.Function, first_across: bool = False) -> tuple[np.ndarray, float, float]:
         """The change of the first costate, the miss of the goal, and the relative slope of the effort along it.
 
         The least effort to a state has the slope -costate and the Hessian -d(costate)/d(state). Of a step
         the part across the goal brings its rows to zero, the part along it goes down that parabola; with
-        the curvature of the goal, once that is near.
+        the curvature of the goal, once that is near. `first_across` leaves out the part along it until then.
         """
         flow = np.linalg.solve(self.state_slopes.T, self.costate_slopes.T).T
         hessian = -0.5 * (flow + flow.T)
@@ -159,6 +159,8 @@ class Shot:
         along = -modes @ (uphill / np.maximum(np.abs(curvature), LEAST_CURVATURE))
         if error < CLOSE:
             along *= min(1.0, LONGEST_STEP / (np.linalg.norm(along) or 1.0))
+        elif first_across:
+            along *= 0.0
         slope = np.linalg.norm(tangents.T @ self.costate) / (np.linalg.norm(self.costate) or 1.0)
         return np.linalg.solve(self.state_slopes, across + tangents @ along), error, float(slope)
 
@@ -188,26 +190,40 @@ def first_costate(extremal: Extremal) -> np.ndarray | None:
     thrust is switched on when the goal is nearly met.
     """
     problem, coast = extremal.problem, np.zeros(len(extremal.scales))
-    bare = tuple(effect for effect in problem.effects if effect.attractor() is not None)
-    known = None
-    if problem.attraction.lone is not None and len(bare) < len(problem.effects):
-        alone = replace(extremal, problem=replace(problem, effects=bare))
-        known = _searched(alone, coast, False, MET)
+    known = _around_bare_attractor(extremal)
     stages = (False, True) if problem.actuator.force_limit() is not None else (False,)
     # Where what disturbs the orbit is so strong that this leads nowhere, the coast itself has to do.
     for begin in (coast,) if known is None else (known, coast):
         costate: np.ndarray | None = begin
         for limited in stages:
             if costate is not None:
-                costate = _searched(extremal, costate, limited, MET if limited == stages[-1] else ROUGHLY_MET)
+                costate = searched(extremal, costate, limited, MET if limited == stages[-1] else ROUGHLY_MET)
         if costate is not None:
             return costate
     return None
 
 
-def _searched(extremal: Extremal, costate: np.ndarray, limited: bool, enough: float) -> np.ndarray | None:
+def _around_bare_attractor(extremal: Extremal) -> np.ndarray | None:
+    """The costate around the attractor alone; None where nothing else acts, or where none is found."""
+    problem = extremal.problem
+    bare = tuple(effect for effect in problem.effects if effect.attractor() is not None)
+    if problem.attraction.lone is None or len(bare) == len(problem.effects):
+        return None
+    return searched(
+        replace(extremal, problem=replace(problem, effects=bare)), np.zeros(len(extremal.scales)), False, MET
+    )
+
+
+def roughly_least_effort(extremal: Extremal) -> np.ndarray | None:
+    """The costate with which the goal is nearly met at the least effort, whatever the thrust; else None."""
+    begin = _around_bare_attractor(extremal)
+    begin = np.zeros(len(extremal.scales)) if begin is None else begin
+    return searched(extremal, begin, False, ROUGHLY_MET)
+
+
+def searched(extremal: Extremal, costate: np.ndarray, limited: bool, enough: float) -> np.ndarray | None:
     """The costate at the start from which the goal is met so well, shot after shot; None if there is none."""
-    goal = _goal_rows(extremal)
+    goal = goal_rows(extremal)
     for _ in range(MOST_SHOTS):
         try:
             change, miss, slope = extremal.shot(costate, limited).correction(goal)
@@ -221,7 +237,7 @@ def _searched(extremal: Extremal, costate: np.ndarray, limited: bool, enough: fl
     return costate if miss < CLOSE else None
 
 
-def _goal_rows(extremal: Extremal) -> ca.Function:
+def goal_rows(extremal: Extremal) -> ca.Function:
     """(scaled state, multipliers) -> equations of the goal, their Jacobian, Hessian of their weighted sum."""
     problem, axes = extremal.problem, extremal.problem.dimension
     state = ca.SX.sym("state", 2 * axes)

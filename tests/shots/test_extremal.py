@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dmoc import solve, verify
-from dmoc.guess.extremal import Extremal, first_costate
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.shots.extremal import Extremal, first_costate
 
 CASE = runpy.run_path(str(Path(__file__).parents[1] / "cases" / "leo_many.py"))
 MU, EARTH = CASE["MU"], CASE["EARTH"]

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from dmoc.basics.memory import remembered
-from dmoc.guess.extremal import Extremal, Shot
 from dmoc.scene.problem import TransferProblem
+from dmoc.shots.extremal import Extremal, Shot
 
 # The goal is met if no part of the state misses it by more than this, in the units of `Extremal` [-].
 MET = 1e-6

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from dmoc import Effort, Engine, FreeForce, State, TransferProblem, solve, three_body, verify
-from dmoc.guess.flyby import least_effort_past
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import graded_guess, steps_past
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
+from dmoc.shots.flyby import least_effort_past
 
 # The states and durations of random forces flown by SciPy, and their efforts: no optimum costs more. Blended
 # coasts led to 2.077 and 1.633, on the other side of the smaller attractor.

@@ -1,0 +1,1 @@
+"""Paths by shooting: the motion under the best thrust, from first costates that are corrected."""

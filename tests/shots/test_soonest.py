@@ -1,0 +1,85 @@
+"""Least time over many revolutions: full force throughout, by shooting and then on a mesh."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dmoc import (
+    J2,
+    BallForce,
+    CircularOrbit,
+    Engine,
+    Orbit,
+    PointGravity,
+    State,
+    Time,
+    TransferProblem,
+    solve,
+    verify,
+)
+from dmoc.meshes.choices import first_path
+from dmoc.rungs.full import gains_nothing
+from dmoc.shots.soonest import least_time
+from dmoc.solver.ladder import Ladder
+
+MU, EARTH, RADIUS = 3.986004418e14, 6378137.0, 7078137.0
+
+
+def raising(climb, actuator, bounds, goal=None, oblate=False):
+    """From a tilted circle of 700 km to a higher one with a small force."""
+    speed = math.sqrt(MU / RADIUS)
+    velocity = (0, speed * math.cos(0.9), speed * math.sin(0.9))
+    goal = goal or Orbit(MU, a=RADIUS + climb, e=0.0, i=0.9)
+    effects = [PointGravity(MU), *[J2(MU, EARTH, 1.08263e-3)] * oblate]
+    return TransferProblem(500.0, State((RADIUS, 0, 0), velocity), goal, bounds, effects, actuator, Time())
+
+
+def edelbaum(problem, climb):
+    """The time in which the force makes up for the difference of the speeds of two circles [s]."""
+    change = math.sqrt(MU / RADIUS) - math.sqrt(MU / (RADIUS + climb))
+    return change * problem.mass / problem.actuator.force_limit()
+
+
+@pytest.mark.parametrize("goal", [None, CircularOrbit(RADIUS + 100e3, mu=MU)])
+def test_the_guess_over_many_revolutions_is_the_answer_but_for_the_mesh(goal):
+    """From the least effort in a longer time 78 iterations were taken, or 96."""
+    problem = raising(100e3, BallForce(0.4), (3e4, 2e5), goal)
+    solution = solve(problem)
+    assert solution.success and verify(solution).ok
+    assert solution.duration == pytest.approx(edelbaum(problem, 100e3), rel=0.01)
+    assert np.linalg.norm(solution.force, axis=1) == pytest.approx(0.4)
+    assert solution.iterations < 20
+
+
+def test_the_path_ends_on_the_goal_under_full_force():
+    problem = raising(100e3, BallForce(0.4), (3e4, 2e5))
+    _, path = least_time(problem, edelbaum(problem, 100e3), problem.start.fixed())
+    position, velocity, force, mass = path(np.linspace(0.0, 1.0, 101))
+    goal = RADIUS + 100e3
+    assert np.linalg.norm(position[-1]) == pytest.approx(goal, rel=2e-6)
+    assert np.linalg.norm(velocity[-1]) == pytest.approx(math.sqrt(MU / goal), rel=2e-6)
+    assert np.linalg.norm(force, axis=1) == pytest.approx(0.4) and (mass == 500.0).all()
+
+
+def test_full_force_is_no_answer_where_a_smaller_one_takes_less_time():
+    """The multipliers of the force held at its limit would push it inwards."""
+    problem = raising(100e3, BallForce(0.4), (3e4, 2e5))
+    ladder = Ladder(problem)
+    rung = ladder.climb_to(first_path(problem))
+    assert rung.solved and gains_nothing(rung, problem)
+    turned = replace(rung.answer, lam_g=-rung.answer.lam_g, lam_x=-rung.answer.lam_x)
+    assert not gains_nothing(replace(rung, answer=turned), problem)
+
+
+@pytest.mark.slow
+def test_eighty_revolutions_around_an_oblate_body_take_seconds():
+    """From the least effort in a longer time no answer was found within 100 s."""
+    engine = Engine(0.25, specific_impulse=1600.0, dry_mass=300.0)
+    problem = raising(500e3, engine, (302400.0, 1209600.0), oblate=True)
+    solution = solve(problem)
+    assert solution.success and verify(solution).ok
+    # Edelbaum's time with all the mass, of which 1.6 % are burnt.
+    assert 0.95 * edelbaum(problem, 500e3) < solution.duration < edelbaum(problem, 500e3)
+    assert solution.iterations < 20
