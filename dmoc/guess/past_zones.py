@@ -121,7 +121,8 @@ def off_saddles(problem: TransferProblem, duration: float, place: np.ndarray, sp
         numbers = at(problem.start_time + duration, found, speed, problem.mass)
         value, slopes, bends = (part.full().ravel() for part in numbers)
         off = float(value[0] - np.clip(value[0], row.lower, row.upper))
-        ways = np.flatnonzero(is_open & (off * bends < 0))
+        # A condition without a value there is told of elsewhere.
+        ways = np.flatnonzero(is_open & (np.sign(off) * np.sign(bends) < 0))
         if len(ways) and not slopes.any():
             found[ways[0]] += np.sqrt(-2 * off / bends[ways[0]])
     return found
