@@ -33,3 +33,10 @@ def test_what_is_given_once_is_the_same_in_all_columns():
     again = columns(a_function(), x, np.tile(u, 4), np.full(4, 0.5), ())
     for one, other in zip(found, again, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_first_may_be_the_one_that_is_given_once():
+    x, u, t = np.array([[1.0], [2.0], [3.0]]), np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0.5, 0.7, 0.9])
+    found, again = columns(a_function(), x, u, t, ()), columns(a_function(), np.tile(x, 3), u, t, ())
+    for one, other in zip(found, again, strict=True):
+        np.testing.assert_array_equal(one, other)
