@@ -268,6 +268,11 @@ def test_bodies_that_leap_through_each_other_between_nodes_are_seen_and_kept_apa
     coarse = solve(team, order=2, steps=3)
     assert coarse.status == "infeasible" and "apart east and north between nodes in phase 1" in coarse.message
     assert not verify(coarse)["together"].ok
+    climb = PhasedClimb(coarse.timetable, None, None, False, None)
+    finer = climb.cut_at_leaps(coarse.path)
+    assert len(finer.mesh[0]) > len(coarse.path.mesh[0]) and len(finer.mesh[1]) == len(coarse.path.mesh[1])
+    apart = climb.unleapt(climb.attempt(coarse.path))
+    assert apart.solved and climb.cut_at_leaps(apart.path) is None
     assert verify(solve(team).raise_for_status()).ok
 
 
