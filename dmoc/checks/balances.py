@@ -12,6 +12,10 @@ from dmoc.configurations.coordinates import ATTITUDE
 from dmoc.motion.march import wrench_of
 from dmoc.motion.momenta import along_path, rates_along
 
+# A control is switched within a step if it changes there by more than this part of the most it takes [-]: at a
+# node between the two values of a switch one of its two steps has half of it, the other may have little.
+SWITCHED = 0.25
+
 
 def balance(evidence: Evidence) -> tuple[float, float]:
     """By how much momentum and impulse differ, over all impulses [-], and the sum of all impulses [m/s].
@@ -80,11 +84,11 @@ def energy_gap(evidence: Evidence) -> float | None:
     change = float(evidence.dynamics.energy(*at[1])) - float(evidence.dynamics.energy(*at[0]))
     push = evidence.loads[1]
     rates = rates_along(evidence.dynamics, evidence.position, evidence.node_velocity)
-    by_steps = 0.0
+    switched = 0.0
     if not evidence.path.hold:
         pushed = evidence.per_mass(evidence.wrench, evidence.mass)
         parts = np.sum((pushed + push) * rates, axis=1) * evidence.weights
-        by_steps = _by_steps(evidence, pushed, rates) - np.sum(pushed * rates, axis=1) @ evidence.weights
+        switched = _of_switches(evidence, pushed, rates)
     elif body.surplus:
         # A held force that is fixed to a turning body turns with it within a step.
         held = _held(evidence)
@@ -97,18 +101,30 @@ def energy_gap(evidence: Evidence) -> float | None:
         middle = evidence.mass[evidence.at].mean(axis=0)
         work = np.sum(evidence.force * moves, axis=1) / middle
         parts = np.concatenate([work, np.sum(push * rates, axis=1) * evidence.weights])
-    # The force of a burn that is shorter than a step meets the velocity of one node, which may be that before
-    # or after all of it: then the work of its impulse in that step is right. Both are quadratures of the work.
-    gaps = np.abs(change - parts.sum() - np.array([0.0, by_steps]))
+    gaps = np.abs(change - parts.sum() - np.array([0.0, switched]))
     return float(gaps.min() / max(evidence.kinetic, np.abs(parts).sum()))
 
 
-def _by_steps(evidence: Evidence, pushed: np.ndarray, rates: np.ndarray) -> float:
-    """The work of the actuator's impulse in each step, at the mean of the velocities at its ends [J/kg]."""
+def _of_switches(evidence: Evidence, pushed: np.ndarray, rates: np.ndarray) -> float:
+    """How much more work impulses of steps with a switch do at their mean velocity than node by node [J/kg].
+
+    The force of a burn that is shorter than a step meets the velocity of one node, which may be that before or
+    after all of it. Elsewhere the work of an impulse says nothing: of a free body it follows from the momentum.
+    """
     lengths = evidence.path.duration * np.diff(evidence.path.mesh)
-    impulses = np.einsum("j,jkn->kn", evidence.rule.weights, pushed[evidence.at]) * lengths[:, None]
+    forces = evidence.rule.weights[:, None, None] * pushed[evidence.at] * lengths[:, None]
     ends = rates[evidence.ends]
-    return float(np.sum(impulses * 0.5 * (ends[1:] + ends[:-1])))
+    by_steps = np.sum(forces.sum(axis=0) * 0.5 * (ends[1:] + ends[:-1]), axis=1)
+    by_nodes = np.einsum("jkn,jkn->k", forces, rates[evidence.at])
+    return float((by_steps - by_nodes)[_switches(evidence)].sum())
+
+
+def _switches(evidence: Evidence) -> np.ndarray:
+    """Steps within which a limited control changes by a good part of the most that it takes."""
+    control = evidence.path.control
+    if not evidence.problem.actuator.limited:
+        return np.zeros(len(evidence.path.mesh) - 1, bool)
+    return (np.ptp(control[evidence.at], axis=0) > SWITCHED * np.abs(control).max(axis=0)).any(axis=1)
 
 
 def amplification(matrices: np.ndarray) -> float:

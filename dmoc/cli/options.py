@@ -99,6 +99,10 @@ Worth = Annotated[
         help="Also say what each number of the problem is worth: the derivative of the objective by it.",
     ),
 ]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="End after so many seconds with the best answer so far."),
+]
 Hold = Annotated[bool, switch("--hold", help="Keep forces constant over each step.")]
 Json = Annotated[bool, switch("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, switch("--quiet", "-q", help="Print the last line only.")]

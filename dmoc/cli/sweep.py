@@ -25,6 +25,7 @@ from dmoc.cli.options import (
     Quiet,
     Settings,
     Steps,
+    TimeLimit,
     switch,
     warn,
     writable,
@@ -35,6 +36,18 @@ if TYPE_CHECKING:
     from dmoc.sweeps.loop import SweepProgress
 
 
+Vary = Annotated[
+    list[str],
+    typer.Option(
+        metavar="NAME=VALUES",
+        help="A parameter and its values, start:stop:count, start:stop:log7 for 7 values of equal ratio, "
+        "or value,value,...; repeat for a grid. With --sample a range start:stop or start:stop:log.",
+    ),
+]
+Sample = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Solve so many points spread over the ranges instead of a grid."),
+]
 Keep = Annotated[
     str | None,
     typer.Option(metavar="paths", help="Also keep every path: a point is then a guess or a picture."),
@@ -58,19 +71,9 @@ Workers = Annotated[int | None, typer.Option(help="Worker processes; as many as 
 
 def sweep(
     problem: Name,
-    vary: Annotated[
-        list[str],
-        typer.Option(
-            metavar="NAME=VALUES",
-            help="A parameter and its values, start:stop:count, start:stop:log7 for 7 values of equal ratio, "
-            "or value,value,...; repeat for a grid. With --sample a range start:stop or start:stop:log.",
-        ),
-    ],
+    vary: Vary,
     out: Annotated[Path, typer.Option(help="Where to write the results (netCDF).")],
-    sample: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Solve so many points spread over the ranges instead of a grid."),
-    ] = None,
+    sample: Sample = None,
     method: Annotated[str, typer.Option(help="How a sample is spread: sobol or latin.")] = "sobol",
     seed: Annotated[int, typer.Option(help="The same seed gives the same sample.")] = 0,
     order: Order = None,
@@ -86,6 +89,7 @@ def sweep(
     error: Errors = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    time_limit: TimeLimit = None,
     restart: Annotated[bool, switch("--restart", help="Begin anew instead of going on.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -117,6 +121,7 @@ def sweep(
             scheduler=scheduler,
             restart=restart,
             progress=progress,
+            time_limit=time_limit,
             **numerics,
             **spread,
         )

@@ -20,7 +20,7 @@ from dmoc.scene.problem import TransferProblem
 ROOM = 1e-3
 # Where a limit as found turns out not to be enough, this much more is tried [-]: at the very least limit a path
 # touches it all the way, or slips between two limits where there is no room to either side.
-LOOSER = (0.0, 0.004, 0.02, 0.08)
+LOOSER = (0.0, 0.004, 0.02, 0.08, 0.2)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
 from dmoc.motion.path import DiscretePath
@@ -101,3 +102,27 @@ def off_centres(problem: TransferProblem, guess: DiscretePath) -> DiscretePath:
     from dmoc.guess.turning import resting_load
 
     return replace(guess, reaction=resting_load(problem, guess))
+
+
+def off_saddles(problem: TransferProblem, duration: float, place: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """The place of the goal; off one where a condition is not met and, to first order, no way leads nearer.
+
+    Such as the centre of a circle that is to be reached. It moves along one open axis to where the condition
+    is met to second order.
+    """
+    is_open = np.isnan(problem.goal.fixed()[0])
+    t, m, q, v = ca.SX.sym("t"), ca.SX.sym("m"), ca.SX.sym("q", len(place)), ca.SX.sym("v", len(speed))
+    rows = problem.goal.rows(t, q, v, m) if is_open.any() and len(place) == problem.dimension else []
+    found = np.array(place)
+    for row in rows:
+        slope = ca.densify(ca.gradient(row.expression, ca.vertcat(q, v)))
+        bend = ca.densify(ca.diag(ca.hessian(row.expression, q)[0]))
+        at = ca.Function("row", [t, q, v, m], [ca.densify(row.expression), slope, bend])
+        numbers = at(problem.start_time + duration, found, speed, problem.mass)
+        value, slopes, bends = (part.full().ravel() for part in numbers)
+        off = float(value[0] - np.clip(value[0], row.lower, row.upper))
+        # A condition without a value there is told of elsewhere.
+        ways = np.flatnonzero(is_open & (np.sign(off) * np.sign(bends) < 0))
+        if len(ways) and not slopes.any():
+            found[ways[0]] += np.sqrt(-2 * off / bends[ways[0]])
+    return found

@@ -12,7 +12,7 @@ from dmoc.basics.arguments import LARGEST, short
 from dmoc.guess.around import path_around, shortest_flyable
 from dmoc.guess.coast import controls_for
 from dmoc.guess.open_ends import end_estimates, spiral_between, spiral_change
-from dmoc.guess.past_zones import off_centres
+from dmoc.guess.past_zones import off_centres, off_saddles
 from dmoc.guess.shot import LIKELY, shot_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
@@ -215,6 +215,7 @@ def _default_path(problem: TransferProblem, duration: float, fractions: np.ndarr
     """Positions, the velocities of both ends, and whether the forces along the path are worth starting from."""
     q0, v0, q1, v1 = _end_states(problem, duration)
     if not problem.attraction.sources:
+        q1 = off_saddles(problem, duration, q1, v1)
         return q0 + fractions[:, None] * (q1 - q0), (v0, v1), False
     path, worth = path_around(problem, duration, ((q0, v0), (q1, v1)), fractions)
     return path, (v0, v1), worth

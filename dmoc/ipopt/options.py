@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.past_zones import has_sides
+from dmoc.ipopt.run import STATUSES
 from dmoc.motion.path import DiscretePath
 from dmoc.results.flown_cost import mass_worth
 from dmoc.results.switches import has_linear_controls
@@ -25,6 +26,10 @@ QUICK = {
     "ipopt.min_refinement_steps": 0,
     "ipopt.fast_step_computation": "yes",
 }
+# Where this over the number of nodes is the tolerance [-], a gradient by a control is off by less than a check
+# allows, which is 1e-5 over a tenth of the mean time of a node. For that the tolerance falls to the second of
+# these parts of the rounding at most.
+SURE, LEAST_ROUNDING = 3e-7, 0.2
 # Over very many revolutions propellant hardly depends on where it is burnt: the barrier begins with this
 # parameter [-], at which that little counts. From 1e-6 or 1e-4 on it takes 45 iterations, not 25.
 FLAT = 1e-9
@@ -43,6 +48,14 @@ def ipopt_alone(options: dict[str, Any] | None) -> bool:
     return all(name.startswith("ipopt.") for name in options or {})
 
 
+def advice_of(status: str, options: dict[str, Any] | None = None) -> str:
+    """What to try after a status; where the user's own options ended the run, that these let it go on."""
+    most = (options or {}).get("ipopt.max_iter")
+    if status == "iteration limit" and most is not None:
+        return f"options={{'ipopt.max_iter': {most}}} ended it: give more, or leave it out"
+    return STATUSES[status].advice
+
+
 def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) -> float:
     """Ipopt's tolerance for scaled rows and gradients [-].
 
@@ -53,6 +66,7 @@ def tolerance(mesh: np.ndarray, degree: int, limited: bool, turns: float = 0.0) 
     and rounding is amplified by the angle passed.
     """
     floor = rounding(mesh, degree)
+    floor = min(floor, max(SURE / (degree * len(mesh)), LEAST_ROUNDING * floor))
     if turns > VERY_MANY_TURNS:
         floor = max(floor, min(floor * 2 * np.pi * turns, LOOSEST))
     return float(max(min(1e-10 if limited else 5e-12, 1e-8 / len(mesh)), floor))

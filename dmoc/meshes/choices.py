@@ -17,7 +17,7 @@ from dmoc.motion.momenta import rates_along
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import TURN_A_STEP, flow_matrices, stable_from, steps_to_turn
 from dmoc.nlp.transcription import check_mesh
-from dmoc.results.switches import corners, is_singular
+from dmoc.results.switches import burns_unpaid, corners, is_singular
 from dmoc.scene.problem import TransferProblem
 
 # The last mesh has this many steps at each order: they reach an error of about 1e-4 to 1e-6 on a smooth
@@ -37,7 +37,7 @@ MOST_PAST = {2: 1600, 4: 800, 6: 400, 8: 300}
 # A transfer of many revolutions has this order if none is asked for.
 ORDER_OF_MANY_TURNS = 6
 # A body that turns has this order if none is asked for: at the same cost its attitude is a thousand times as
-# exact as at order 2.
+# exact as at order 2. So has an engine whose propellant is not paid for: few nodes find a reversal at once.
 ORDER_OF_TURNING = 4
 # From this many revolutions on it has this order: over 97 of them in low orbit six steps of order 8 each miss
 # the goal by 1e-4 of the path, seven of order 6, nearly as many nodes, by 1e-2.
@@ -72,8 +72,6 @@ IN_PHASE = 50
 # A coarse mesh of higher order has at least this many steps a revolution where there are very many: with fewer
 # its optima are others.
 COARSE_TURN = {4: 16, 6: 10, 8: 6}
-# The rounding of |F| on the coarsest mesh is this part of the largest thrust [-].
-WIDEST_ROUNDING = 1e-2
 
 # A solve to a tolerance begins with a trial of this order, if none is asked for.
 TRIAL_ORDER = 4
@@ -104,7 +102,8 @@ def first_path(
     mesh: Any = None,
 ) -> DiscretePath:
     """The guess on the last mesh; order and steps that are not given are those that the motion needs."""
-    if (problem.turns or problem.links) and not hold:
+    unpaid = steps is None and mesh is None and burns_unpaid(problem)
+    if (problem.turns or problem.links or unpaid) and not hold:
         order = order or ORDER_OF_TURNING
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
     first = guess_on(problem, ends, order or 2, hold, guess)
@@ -250,16 +249,6 @@ def fastest_rates(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
     # A mode that dies out need not be followed.
     return np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)
-
-
-def rounding_stages(meshes: list[np.ndarray], rounding: float | None) -> list[tuple[np.ndarray, float | None]]:
-    """The meshes, each with the rounding of |F| at zero: wide on the coarse ones, as asked for on the last."""
-    if rounding is None:
-        return [(mesh, None) for mesh in meshes]
-    count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / rounding))), 0)
-    widths = [WIDEST_ROUNDING * 0.1**i for i in range(count)] + [rounding]
-    repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes
-    return list(zip(repeated, widths + [rounding] * (len(meshes) - len(widths)), strict=True))
 
 
 def best_order(problem: TransferProblem, path: DiscretePath, objective: float, tol: float) -> tuple[int, str]:

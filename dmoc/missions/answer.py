@@ -14,7 +14,8 @@ from dmoc.chains.path import MissionPath, kicks_of
 from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.iterate import SEEN, in_units
 from dmoc.diagnosis.wrong_way import in_two_pieces, turned_round
-from dmoc.ipopt.run import STATUSES, Answer
+from dmoc.ipopt.options import advice_of
+from dmoc.ipopt.run import Answer
 from dmoc.missions.solution import Kick, MissionSolution
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.solution import NOT_MET, Solution, part_solution
@@ -51,7 +52,7 @@ def outcome_of(
     """Status, success and message of an attempt; `broken` says what its answer breaks between nodes."""
     status = attempt.answer.status
     if not attempt.solved:
-        return status, False, climb.reason or STATUSES[status].advice
+        return status, False, climb.reason or advice_of(status, climb.options)
     if broken:
         return "infeasible", False, broken
     if not met:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.chains.path import MissionPath
-from dmoc.results.facts import Error, Level, Provenance, sharper
+from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import (
     Format,
     Table,
@@ -27,6 +27,7 @@ from dmoc.results.netcdf import (
 from dmoc.results.solution import Outcome, Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
 from dmoc.scene.mission import Mission
+from dmoc.scene.rounding import sharp_as_parts
 
 # The name and version by which a file of a mission is known.
 MISSION_FILE = Format(
@@ -178,10 +179,7 @@ class MissionSolution(Outcome):
                 f"mission {problem.name!r} has {len(problem.plan)} legs, the solution {len(self.legs)}; "
                 "attach the mission that was solved"
             )
-        each = zip(self.legs, problem.stretches, strict=True)
-        widths = ((leg.provenance.smoothing, own.actuator.smoothing) for leg, own in each)
-        # An answer may round |F| less than was asked for, by one factor in all legs.
-        problem = sharper(problem, min((have / asked for have, asked in widths if have and asked), default=1.0))
+        problem = sharp_as_parts(problem, self.legs)
         legs = [
             replace(leg, problem=None).attach(
                 problem.fixed_at(i, leg.provenance.start_time, float(leg.path.mass[0]), leg.duration)

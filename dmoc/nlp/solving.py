@@ -12,8 +12,8 @@ import numpy as np
 
 from dmoc.basics.arguments import of_kind
 from dmoc.guess.starting import starting_guess
-from dmoc.ipopt.options import rounding, settings_for
-from dmoc.ipopt.run import STATUSES, Answer, Interrupt, Watch, make_solver, run
+from dmoc.ipopt.options import advice_of, rounding, settings_for
+from dmoc.ipopt.run import Answer, Interrupt, Watch, make_solver, run
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import end_momenta
@@ -204,5 +204,5 @@ class NLP(Program):
         solver = self.solver(options, warm=bool(path.multipliers))
         built = time.perf_counter() - begun
         answer = self.run(solver, new, path)
-        words = "a local optimum" if answer.status == "solved" else STATUSES[answer.status].advice
+        words = "a local optimum" if answer.status == "solved" else advice_of(answer.status, options)
         return self.solution(new, answer, (self.level(answer, built),), words, options)

@@ -11,6 +11,7 @@ from dmoc.chains.path import cold
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.climb import Climb
 from dmoc.missions.guess import first_path
+from dmoc.missions.sharper import onto_magnitude
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.phases.answer import answered
 from dmoc.phases.cuts import phased_leaps
@@ -40,7 +41,7 @@ class PhasedClimb(TeamClimb):
     answered: Any = answered
 
     def prepared(self, first: Attempt, path: Any) -> Attempt:
-        return self.reordered(first)
+        return onto_magnitude(self, self.reordered(first))
 
     def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
         # Other ways round begin on the clock that was found.

@@ -28,6 +28,7 @@ from dmoc.results.netcdf import (
 )
 from dmoc.results.solution import Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_parts
+from dmoc.scene.rounding import sharp_as_parts
 from dmoc.scene.team import Team
 from dmoc.teams.solution import TeamSolution
 
@@ -102,9 +103,9 @@ class PhasedSolution(TeamSolution):
                 f"team {problem.name!r} is of {', '.join(problem.names)} with {_counts(sizes)} legs, the "
                 f"solution of {', '.join(self.names)} with {_counts(mine)}; attach the team that was solved"
             )
-        plan = Timetable(problem, self.joints)
+        plan = sharp_as_parts(Timetable(problem, self.joints), self.parts)
         members = tuple(one.attach(mission) for one, mission in zip(self.members, plan.cut, strict=True))
-        return replace(self, problem=problem, members=members)
+        return replace(self, problem=plan.team, members=members)
 
     def save(self, path: str | os.PathLike, **provenance: Any) -> None:
         """Write the solution to a netCDF-4 file, whole or not at all; `provenance` as of a `Solution`."""

@@ -27,7 +27,7 @@ REMEDIES = {
 # A tolerance that is better than the accuracy of an answer by this factor is named [-].
 BETTER = 100.0
 # No better tolerance is named where an answer is as accurate as this [-].
-ACCURATE = 1e-8
+ACCURATE = 1e-6
 
 
 def verdict_words(solution: Solution, report: Report) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from dmoc.scene.clock import dates_of
@@ -126,25 +126,3 @@ class Provenance:
             **dates_of(problem),
             smoothing=problem.actuator.smoothing,
         )
-
-
-def sharp_as(problem: TransferProblem, smoothing: float | None) -> TransferProblem:
-    """The problem with |F| rounded as little as in an answer of it that rounds it less."""
-    engine: Any = problem.actuator
-    if smoothing is None or engine.smoothing is None or engine.smoothing <= smoothing:
-        return problem
-    return replace(problem, actuator=replace(engine, smoothing=smoothing))
-
-
-def sharper(mission: Any, share: float) -> Any:
-    """A mission with |F| rounded at zero over this part of the width of each engine, if that is less."""
-
-    def less(actuator: Any) -> Any:
-        width = getattr(actuator, "smoothing", None)
-        return actuator if width is None or share >= 1 else replace(actuator, smoothing=share * width)
-
-    def of_part(part: Any) -> Any:
-        own = getattr(part, "actuator", None)
-        return part if own is None else replace(part, actuator=less(own))
-
-    return replace(mission, actuator=less(mission.actuator), legs=tuple(map(of_part, mission.legs)))

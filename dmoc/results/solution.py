@@ -13,7 +13,7 @@ from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
 from dmoc.motion.path import COSTATE, DiscretePath
-from dmoc.results.facts import Error, Level, Provenance, sharp_as
+from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.moments import Moment, moment, named_body
 from dmoc.results.outcome import NOT_MET as NOT_MET
 from dmoc.results.outcome import OUT_OF_TIME as OUT_OF_TIME
@@ -21,6 +21,7 @@ from dmoc.results.outcome import Outcome as Outcome
 from dmoc.results.outcome import SolveError as SolveError
 from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
+from dmoc.scene.rounding import sharp_as
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath, Key
 from dmoc.motion.scales import path_scales
+from dmoc.results.flown_cost import mass_worth
 from dmoc.scene.problem import TransferProblem
 
 # The times of switches are listed only if there are no more than this many: a message must stay short.
@@ -46,6 +47,13 @@ def is_singular(problem: TransferProblem, path: DiscretePath) -> bool:
 def has_linear_controls(problem: TransferProblem) -> bool:
     """Whether the cost is linear in controls that have limits: then many paths may cost the same."""
     return bool(_linear(problem, problem.controls).any())
+
+
+def burns_unpaid(problem: TransferProblem) -> bool:
+    """Whether an engine burns propellant that no cost counts, as in least time."""
+    burns = problem.actuator.burns and problem.actuator.smoothing is not None
+    paid = problem.objective.metered or mass_worth(problem) != 0.0
+    return bool(burns and not paid and has_linear_controls(problem))
 
 
 def linear_controls(problem: TransferProblem) -> np.ndarray:

@@ -12,13 +12,13 @@ import numpy as np
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
 from dmoc.ipopt.run import STATUSES, Answer
-from dmoc.meshes.choices import WIDEST_ROUNDING
+from dmoc.meshes.widths import WIDEST_ROUNDING, WIDEST_UNPAID
 from dmoc.motion.path import DURATION, DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.units import outgrown
 from dmoc.results.facts import Level, off_optimum
 from dmoc.results.solution import NOT_MET, OUT_OF_TIME, Solution
-from dmoc.results.switches import has_linear_controls
+from dmoc.results.switches import burns_unpaid, has_linear_controls
 from dmoc.scene.clock import cautions_of
 from dmoc.scene.problem import TransferProblem
 
@@ -36,6 +36,9 @@ LESS, LEAST_LESS = 0.3, 0.7
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
 MOST_LETTING_GO, MOST_LET_GO = 60, 30
+# On the way to a path that a wide rounding of |F| would find sooner, it is first this many times as wide. Where
+# propellant burns that no cost counts it is over these parts of the largest thrust [-].
+WIDER, UNPAID = 10.0, [WIDEST_UNPAID, 0.1, 0.01]
 # A throttle is far from zero if it is everywhere more than this many times the widest rounding of |F| [-]: that
 # changes |F| by 2 % at most.
 FAR = 5.0
@@ -126,11 +129,10 @@ def settled(made: Any, again: Callable[[Any], Any]) -> Any:
 
 
 def told(cause: Cause, problem: TransferProblem, holds: Callable[[TransferProblem], bool] | None) -> str:
-    """A cause in words, with remedies that hold; without constraints and propellant they always do."""
+    """A cause in words, with remedies that hold, if there is somebody to say which do."""
     # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
     local = problem.attraction.first is not None and problem.attraction.lone is None
-    risky = problem.constraints or problem.actuator.burns
-    return (cause.proven(holds) if risky and holds else cause).words(local)
+    return (cause.proven(holds) if holds else cause).words(local)
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:
@@ -191,6 +193,14 @@ def answered(asked: TransferProblem, used: TransferProblem) -> TransferProblem:
     wanted, have = asked.actuator.smoothing, used.actuator.smoothing
     sharper = wanted is not None and have is not None and have < wanted
     return replace(asked, actuator=used.actuator) if sharper else asked
+
+
+def widths_on_the_way(problem: TransferProblem) -> list[float | None]:
+    """Over what |F| is rounded on the way to an answer that is not found at once, the last as asked for."""
+    rounding = problem.actuator.smoothing
+    if rounding is None:
+        return [None]
+    return [*(UNPAID if burns_unpaid(problem) else [WIDER * rounding]), None]
 
 
 def rounded(problem: TransferProblem, rounding: float | None) -> TransferProblem:

@@ -18,6 +18,8 @@ from dmoc.sensitivity.worth import conditions_of, is_direction
 
 # These numbers have no meaning at zero and below.
 POSITIVE = ("mass", "duration")
+# A prediction that breaks a limit by more than this part of its size is none [-].
+MOST_BROKEN = 1.0
 
 
 def predict(solution: Any, **changes: Any) -> Any:
@@ -45,7 +47,7 @@ def predict(solution: Any, **changes: Any) -> Any:
     ------
     ValueError
         If the problem has no such number, or the answer is degenerate, so that its conditions do not say how it
-        moves.
+        moves; or if a change leads so far that a limit would be broken by its own size.
 
     Notes
     -----
@@ -59,11 +61,14 @@ def predict(solution: Any, **changes: Any) -> Any:
     by = np.concatenate([wanted.get(one.name, one.value) - one.value for one in numbers])
     by = np.nan_to_num(by)
     moved = made.tangent(by[:, None])
-    lower, upper, *_ = optimum.matrices
-    x = optimum.x + moved.x[:, 0]
-    x = np.clip(x, optimum.bounds[0] + lower @ by, optimum.bounds[1] + upper @ by)
+    bounds = [bound + way @ by for bound, way in zip(optimum.bounds, optimum.matrices, strict=False)]
+    x, rows = optimum.x + moved.x[:, 0], optimum.rows + moved.rows[:, 0]
+    _refuse_what_breaks_limits(
+        changes, np.concatenate([x, rows]), *map(np.concatenate, (bounds[::2], bounds[1::2]))
+    )
+    x = np.clip(x, *bounds[:2])
     lam_x, lam_g = optimum.lam_x + moved.lam_x[:, 0], optimum.lam_g + moved.lam_g[:, 0]
-    answer = Answer(x, lam_x, lam_g, optimum.rows + moved.rows[:, 0], 0.0, "", 0, 0, 0.0)
+    answer = Answer(x, lam_x, lam_g, rows, 0.0, "", 0, 0, 0.0)
     if getattr(solution.problem, "phased", False):
         return _of_phases(optimum, answer, wanted)
     if hasattr(solution.problem, "members"):
@@ -72,6 +77,20 @@ def predict(solution: Any, **changes: Any) -> Any:
         return _of_mission(optimum, answer, wanted)
     path = _with_unit_quaternions(optimum.program.path(solution.problem, answer))
     return _with_stated(optimum.program.columns, path, wanted)
+
+
+def _refuse_what_breaks_limits(changes: Any, values: Any, lower: Any, upper: Any) -> None:
+    """ValueError if unknowns or rows, in units of their size, are far beyond their limits.
+
+    Limits that do not act at the answer are not looked at, so that a change that is too large breaks them.
+    """
+    broken = float(np.maximum(lower - values, values - upper).max(initial=0.0))
+    if broken > MOST_BROKEN:
+        told = ", ".join(f"{name}={short(value)}" for name, value in changes.items())
+        raise ValueError(
+            f"{told} is too far from the answer: to first order a limit would be broken by {broken:.3g} times "
+            "its size; predict in smaller changes, or solve with these values"
+        )
 
 
 def _of_mission(optimum: Optimum, answer: Answer, wanted: dict[str, np.ndarray]) -> Any:

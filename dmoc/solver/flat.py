@@ -9,13 +9,13 @@ import numpy as np
 
 from dmoc.configurations.acting import state_symbols
 from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
-from dmoc.meshes.choices import WIDEST_ROUNDING, rounding_stages
+from dmoc.meshes.widths import WIDEST_ROUNDING, rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.parts.objectives import Effort
 from dmoc.results.switches import has_linear_controls
-from dmoc.rungs.rung import HELD, Rung, let_go, rounded
+from dmoc.rungs.rung import HELD, Rung, let_go, rounded, widths_on_the_way
 from dmoc.scene.problem import TransferProblem
-from dmoc.solver.ladder import WIDER, Ladder
+from dmoc.solver.ladder import Ladder
 
 # There is thrust to spare if the change of velocity takes less than this part of the duration at the largest
 # thrust, and the path of least effort no more than this part of that thrust [-]: where it takes more, least
@@ -41,7 +41,7 @@ def held_near_least_effort(ladder: Ladder, first: DiscretePath) -> Rung | None:
     five iterations each time and lies a thousandth above its optimum.
     """
     problem = ladder.problem
-    widths = [width for _, width in rounding_stages([first.mesh], problem.actuator.smoothing)]
+    widths = [width for _, width in rounding_stages([first.mesh], problem)]
     wide = None if widths[0] is None else max(WIDEST_ROUNDING, widths[0])
     effort = replace(rounded(problem, wide), objective=Effort())
     rung = ladder.ask(effort, first, "least effort", MOST_EFFORT)
@@ -77,8 +77,7 @@ def held_near_two_burns(ladder: Ladder, first: DiscretePath) -> Rung | None:
     path = two_burns(ladder.problem, first)
     if path is None:
         return None
-    rounding = ladder.problem.actuator.smoothing
-    for width in [None] if rounding is None else [WIDER * rounding, None]:
+    for width in widths_on_the_way(ladder.problem):
         rung = ladder.try_on(path, width, MOST_FROM_BURNS, lean=NEAR_BURNS)
         if not rung.solved:
             return rung if rung.stopped else None

@@ -14,9 +14,10 @@ from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
-from dmoc.ipopt.options import barrier_from, ipopt_alone
-from dmoc.ipopt.run import STATUSES, Interrupt
-from dmoc.meshes.choices import coarse_to_fine, rounding_stages
+from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
+from dmoc.ipopt.run import Interrupt
+from dmoc.meshes.choices import coarse_to_fine
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.stability import refuse_unstable
@@ -25,6 +26,8 @@ from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.results.facts import Level
 from dmoc.results.solution import Solution
+from dmoc.results.switches import burns_unpaid
+from dmoc.rungs import rung as rungs
 from dmoc.rungs.full import at_full_force
 from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded, settled, told
 from dmoc.rungs.tube import FROM_HALFWAY, HALFWAY, around, in_tube, led, out_of_tube
@@ -42,8 +45,6 @@ SOONER = 2
 MOST_TRYING = 150
 # A refinement of a mesh ends after this many iterations, and then each other way to it after the number above.
 MOST_REFINING = 300
-# On the way to a path that a wide rounding of |F| would find sooner, it is first this many times as wide.
-WIDER = 10.0
 # These statuses do not tell whether there is a path at all, so its cause is looked for.
 UNEXPLAINED = ("infeasible", "restoration failed", "iteration limit", "failed")
 
@@ -82,7 +83,7 @@ class Ladder:
             return self._explained(self.solve_on(first), first, None, None)
         cause, curved = None, is_curved(self.problem, first)
         # In the unknowns of a chart no wide rounding of |F| has to lead to the right paths.
-        stages = rounding_stages(meshes, None if curved else self.problem.actuator.smoothing)
+        stages = [(mesh, None) for mesh in meshes] if curved else rounding_stages(meshes, self.problem)
         for (mesh, rounding), (following, _) in zip(stages, [*stages[1:], (None, None)], strict=True):
             if mesh is following and nowhere_zero(known, self.problem):
                 continue
@@ -191,11 +192,10 @@ class Ladder:
         the way. Pinned from the outset, the free duration comes last. `lean` is how strongly an answer is held
         near the guess. Around an attractor a path that leads nowhere walks in tubes first.
         """
-        rounding = self.problem.actuator.smoothing
-        by_way: list[float | None] = [None] if rounding is None else [WIDER * rounding, None]
+        by_way = rungs.widths_on_the_way(self.problem)
         free: list[tuple[bool, list[float | None]]] = [(False, [None])]
         ways: list[tuple[bool, list[float | None]]] = [(True, [None]), (True, by_way)]
-        if not self.problem.free_duration:
+        if not self.problem.free_duration or burns_unpaid(self.problem):
             ways = [(False, by_way)]
         walks = not (lean or pinned) and around(self.problem, guess) is not None
         for pin, widths in ways + free if pinned else free + ways:
@@ -288,7 +288,7 @@ class Ladder:
         known = errors or {}
         reason = "" if rung.cause is None or rung.solved else told(rung.cause, self.problem, self.holds)
         levels = tuple(replace(level, error=known.get(i)) for i, level in enumerate(self._levels))
-        message = "a local optimum" if rung.solved else reason or STATUSES[rung.answer.status].advice
+        message = "a local optimum" if rung.solved else reason or advice_of(rung.answer.status, self.options)
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
         return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)

@@ -10,7 +10,8 @@ import numpy as np
 from dmoc.diagnosis.cause import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
-from dmoc.meshes.choices import coarse_to_fine, rounding_stages
+from dmoc.meshes.choices import coarse_to_fine
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.path import DiscretePath
 from dmoc.results.between import Cut
 from dmoc.rungs.rung import Rung
@@ -113,7 +114,7 @@ def _cleared(ladder: Ladder, rung: Rung, first: DiscretePath, refined: bool) -> 
 
 def _sharpened(ladder: Ladder, guess: DiscretePath) -> Rung:
     """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
-    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+    for _, width in rounding_stages([guess.mesh], ladder.problem):
         rung = ladder.try_on(guess, width)
         if not rung.solved:
             break

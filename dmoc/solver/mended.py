@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -29,8 +29,9 @@ PARTS = 4
 # An answer that misses the goal by less than this part of the path is near the one on a finer mesh [-]: all of
 # four such answers led there, in 1 to 4 iterations, and one in six of those that missed it by more.
 NEAR = 0.1
-# Where the rounding of |F| costs more than this part [-], |F| is rounded over a tenth, at most so many times.
-PAID, MOST_SHARPER = 1e-3, 4
+# Where the rounding of |F| costs more than this part [-], |F| is rounded less, at most so many times: over a
+# tenth of the width before or, where that leads nowhere, over the next part of it [-].
+PAID, MOST_SHARPER, SHARES = 1e-3, 4, (0.1, 0.3)
 
 # What a user is told of an answer that was mended, or could not be.
 MADE_FINER = "the first mesh was too coarse for this motion: it was made finer"
@@ -103,20 +104,34 @@ def onto_price(ladder: Ladder, rung: Rung, pinned: bool = False) -> Rung:
 
 
 def onto_magnitude(ladder: Ladder, rung: Rung) -> Rung:
-    """An answer that hardly pays for the rounding of |F| at zero: it is rounded less where that costs much.
+    """An answer that hardly pays for the rounding of |F| at zero, as `narrowed`."""
+
+    def again(rung: Rung, share: float) -> Rung:
+        sharper = ladder.try_on(rung.path, share * (rung.problem.actuator.smoothing or 0.0))
+        return replace(sharper, notes=rung.notes)
+
+    return narrowed(rung, lambda rung: rounded_share(ladder.dynamics, rung.path), again)
+
+
+def narrowed(made: Any, paid: Callable[[Any], float], again: Callable[[Any, float], Any]) -> Any:
+    """An answer of a transfer or of several with |F| rounded less where that costs much.
 
     The width is a part of the largest thrust, so that one far above what a transfer takes is paid for on the
-    whole way: with 1e4 N for a transfer of 1 N s in 4 s that was a third of the cost.
+    whole way: with 1e4 N for a transfer of 1 N s in 4 s that was a third of the cost. `paid` is which part of
+    the impulse is paid and not flown [-], and `again` makes an attempt from an answer, with |F| rounded over a
+    part of its width.
     """
     for _ in range(MOST_SHARPER):
-        width = rung.problem.actuator.smoothing
-        if not rung.solved or width is None or rounded_share(ladder.dynamics, rung.path) <= PAID:
+        if not made.solved or paid(made) <= PAID:
             break
-        sharper = ladder.try_on(rung.path, 0.1 * width)
-        if not sharper.solved:
-            return sharper if sharper.stopped else rung
-        rung = replace(sharper, notes=rung.notes)
-    return rung
+        for share in SHARES:
+            tried = again(made, share)
+            if tried.solved or tried.answer.status == "stopped":
+                break
+        if not tried.solved:
+            return tried if tried.answer.status == "stopped" else made
+        made = tried
+    return made
 
 
 def _unpriced(ladder: Ladder, rung: Rung) -> float:

@@ -19,7 +19,7 @@ from dmoc.results.estimate import (
 from dmoc.results.facts import Error, off_optimum
 from dmoc.results.flown_cost import TINY
 from dmoc.results.solution import NOT_MET, Solution
-from dmoc.results.switches import corners, has_linear_controls, switches_in_words
+from dmoc.results.switches import burns_unpaid, corners, has_linear_controls, switches_in_words
 from dmoc.rungs.rung import Rung, at_rest, unmet
 from dmoc.scene.problem import TransferProblem
 from dmoc.solver.ladder import Ladder
@@ -83,7 +83,7 @@ class Refinement:
         self.errors: dict[int, float] = {}
         self.best: _Found | None = None
         self.rounded, self.flat, self.lean, self.worse = 0.0, False, 0.0, 0
-        self.linear = has_linear_controls(ladder.problem)
+        self.linear = has_linear_controls(ladder.problem) and not burns_unpaid(ladder.problem)
 
     def of(self, rung: Rung, order: int, hold: bool) -> Solution:
         """Refine from a first answer until the tolerance is met or nothing is gained any more."""
@@ -96,7 +96,11 @@ class Refinement:
             rung = self._refined(coarse.onto(cut(coarse.mesh, parts), order, hold))
             if not rung.solved or EQUALLY_GOOD * rung.gain > self.tol:
                 if self.best is None or rung.stopped:
-                    return self.ladder.solution(rung, self.errors, tolerance=self.tol)
+                    found = self.ladder.solution(rung, self.errors, tolerance=self.tol)
+                    if not rung.solved:
+                        return found
+                    # A duration that was kept although another one costs less makes no answer.
+                    return replace(found, success=False, status=NOT_MET, message=unmet(None, self.tol))
                 return self.settled(f"{self.reason}; {len(rung.nlp.mesh) - 1} steps were given up")
             if not self.changes and rung.pull > self.off:
                 rung = at_rest(self.ladder.try_on, rung, self.lean, self.tol)

@@ -12,7 +12,8 @@ from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
 from dmoc.guess.shot import least_effort_to_orbit
 from dmoc.guess.starting import guess_duration, starting_guess
-from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps, rounding_stages
+from dmoc.meshes.choices import COARSEST_NODES, ORDER_OF_MANY_TURNS, least_steps
+from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights, uniform_mesh
 from dmoc.motion.path import DiscretePath
@@ -174,7 +175,7 @@ def _without_limits(ladder: Ladder, guess: DiscretePath) -> DiscretePath | None:
 
 def _sharpened(ladder: Ladder, guess: DiscretePath, pinned: bool) -> Rung:
     """An answer on the mesh of a guess, with |F| rounded less and less, if at all."""
-    for _, width in rounding_stages([guess.mesh], ladder.problem.actuator.smoothing):
+    for _, width in rounding_stages([guess.mesh], ladder.problem):
         rung = ladder.try_on(guess, width, pinned=pinned)
         if not rung.solved:
             break

@@ -14,14 +14,8 @@ from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import OTHER_TURNS, with_more_turns
 from dmoc.guess.past_zones import ways_past
 from dmoc.guess.starting import angle_around, starting_guess
-from dmoc.meshes.choices import (
-    COARSEST_NODES,
-    WIDEST_ROUNDING,
-    coarse_to_fine,
-    first_path,
-    followed,
-    least_steps,
-)
+from dmoc.meshes.choices import COARSEST_NODES, coarse_to_fine, first_path, followed, least_steps
+from dmoc.meshes.widths import WIDEST_ROUNDING
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import path_scales
 from dmoc.nlp.transcription import check_mesh

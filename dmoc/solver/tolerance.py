@@ -7,7 +7,7 @@ from typing import Any
 
 from dmoc.meshes.choices import TRIAL_ORDER, best_order, is_uneven, trial_path, with_as_many_nodes
 from dmoc.meshes.smooth import finer, smooth_path
-from dmoc.results.solution import Solution
+from dmoc.results.solution import NOT_MET, Solution
 from dmoc.results.switches import is_singular
 from dmoc.solver.flat import flat_optimum
 from dmoc.solver.ladder import UNEXPLAINED, Ladder
@@ -70,7 +70,7 @@ def climb_to_tolerance(
             trial = again if again.solved else trial
     found = refinement.of(trial, order, hold)
     limited = any("max_" in name for name in ladder.options or ())
-    if refinement.best is not None or found.status not in UNEXPLAINED or limited:
+    if refinement.best is not None or found.status not in (*UNEXPLAINED, NOT_MET) or limited:
         return found
     # The second mesh led nowhere from the answer on the first one: begin anew, on as many steps.
     first = trial_path(ladder.problem, order, MORE * (len(trial.nlp.mesh) - 1), hold, guess)

@@ -131,7 +131,8 @@ def solve(
     order : int
         2 (the default, equation (16)), 4, 6 or 8. Where the guess passes so near an attractor that the
         motion there is five times as fast as elsewhere, steps are equal angles, not equal times, and
-        the default is 4; from three revolutions on it is 6. For a body that turns it is 4.
+        the default is 4; from three revolutions on it is 6. For a body that turns it is 4, and so it is in
+        least time for an engine that burns.
     steps : int
         Steps of the last mesh; if not given 400, 100, 50, 32 at orders 2, 4, 6, 8, and over many
         revolutions as many as these need. Or `mesh`: the step ends as increasing fractions 0..1. Of a

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dmoc.basics.arguments import short
+from dmoc.basics.arguments import number, short
 from dmoc.basics.compiled import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
 from dmoc.sweeps.data import FLIGHTS, PATH, as_attributes, sweep_dataset, write_sweep
@@ -47,6 +47,7 @@ def sweep(
     scheduler: str | None = None,
     restart: bool = False,
     progress: SweepProgress | None = None,
+    time_limit: float | None = None,
 ) -> Dataset:
     """Solve and verify a problem at many values of its parameters.
 
@@ -95,6 +96,9 @@ def sweep(
         Begin anew even where a journal is there.
     progress : callable
         Called with (tries made, tries in all as far as known, points not solved so far).
+    time_limit : float
+        Seconds after which the solve of a point ends: that is no success, the message says so, and the point is
+        tried again from a neighbour.
 
     Returns
     -------
@@ -122,7 +126,9 @@ def sweep(
         )
     if keep not in (None, "paths"):
         raise ValueError(f"keep must be 'paths' or nothing; got {keep!r}")
-    numerics = {"order": order, "steps": steps, "tol": tol, "hold": hold}
+    numerics: dict[str, Any] = {"order": order, "steps": steps, "tol": tol, "hold": hold}
+    if time_limit is not None:
+        numerics["time_limit"] = number("time_limit", time_limit, "s", positive=True)
     known = _errors(errors)
     facts = _facts(file, plan, fixed, numerics | {"follow": follow} | ({"errors": known} if known else {}))
     if plan.sampled:

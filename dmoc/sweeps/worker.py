@@ -44,7 +44,7 @@ class Task:
     values : dict
         Its parameters.
     numerics : dict
-        order, steps, tol and hold of `solve`.
+        order, steps, tol, hold and, if there is one, time_limit of `solve`.
     start : str or None
         The path of a neighbour, from `pack`.
     again : bool

@@ -12,6 +12,7 @@ from dmoc.chains.path import cold
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.climb import Climb
 from dmoc.missions.meshes import mesh_around
+from dmoc.missions.sharper import onto_magnitude
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.nlp.transcription import check_mesh
 from dmoc.parts.objectives import Effort
@@ -46,7 +47,7 @@ class TeamClimb(Climb):
     answered: Any = answered
 
     def prepared(self, first: Attempt, path: Any) -> Attempt:
-        return first
+        return onto_magnitude(self, first)
 
     def finished(self, first: Attempt, path: Any, tol: float | None) -> tuple[Attempt, Error | None, bool]:
         found, error, met = self.refined(first, tol)

@@ -25,6 +25,7 @@ from dmoc.results.netcdf import (
 )
 from dmoc.results.solution import Outcome, Solution
 from dmoc.results.table import outcome_fields, provenance_of, solution_of, solution_parts
+from dmoc.scene.rounding import sharp_as_parts
 from dmoc.scene.team import Team
 from dmoc.teams.path import TeamPath
 
@@ -164,6 +165,7 @@ class TeamSolution(Outcome):
                 f"team {problem.name!r} is of {', '.join(problem.names)}, the solution of "
                 f"{', '.join(self.names)}; attach the team that was solved"
             )
+        problem = sharp_as_parts(problem, self.members)
         members = [
             one.attach(problem.fixed_at(i, self.provenance.start_time, float(one.path.mass[0]), self.duration))
             for i, one in enumerate(self.members)

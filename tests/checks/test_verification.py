@@ -274,6 +274,29 @@ def test_ledger_fails_where_work_and_energy_differ():
     assert check.value > 0.01
 
 
+def test_ledger_fails_where_a_free_body_takes_a_way_that_its_forces_do_not_lead():
+    """Its momentum at both ends fits all impulses all the same."""
+    found = solve(made("free_flyer"))
+    aside = 0.1 * np.sin(2 * np.pi * found.path.fractions)[:, None] ** 3
+    check = verify(with_path(found, position=found.path.position + aside))["ledger"]
+    assert not check.ok and check.unit == "of the energy" and check.value > 0.02
+
+
+def test_the_work_of_a_force_that_is_not_switched_is_told_apart_from_its_impulses():
+    """In three steps of h = 1 s to a speed of 1.5 m/s.
+
+    At their mean velocities the impulses of the steps always do the work that a free body has as energy. The
+    forces at the nodes do (h^2 / 8) (f(T)^2 - f(0)^2) more.
+    """
+    scene = TransferProblem(1.0, State([0.0], [0]), State([1.5], [1.5]), 3.0)
+    coarse = solve(scene, steps=3)
+    check = verify(coarse)["ledger"]
+    assert not check.ok and check.unit == "of the energy"
+    more = (coarse.force[-1, 0] ** 2 - coarse.force[0, 0] ** 2) / 8
+    assert check.value == pytest.approx(more / (1.5**2 / 2 + more))
+    assert verify(solve(scene, steps=40))["ledger"].ok
+
+
 def test_residual_fails_on_another_velocity_at_either_end():
     """Where a velocity is free no bound holds it: only the momentum of that end tells it from another."""
     push = State((1, None), (None, 0.5))

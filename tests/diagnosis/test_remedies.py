@@ -422,23 +422,17 @@ LONG = {
     "a passage in a free time",
     "two zones",
     "an approach cone",
+    "motors of wheels",
+    "what wheels store",
+    "a limit of momentum",
+    "ball torque",
+    "a motor in a hinge",
+    "a motor in a slide",
+    "pushes on one of two bodies",
 }
-# Not kept yet: what is named is not enough on the mesh of the scene, or the limit is left out of the problem.
-SHORT = {
-    "motors of wheels": "the numbers that are named leave a check red on 24 steps",
-    "a motor in a hinge": "the duration that is named leaves a check red on 20 steps",
-    "pushes on one of two bodies": "the force and torque that are named are not enough",
-}
-SLOW = LONG | set(SHORT) | {"ball torque", "what wheels store", "a limit of momentum", "a motor in a slide"}
 
 
-def marked(name):
-    marks = [pytest.mark.slow] if name in SLOW else []
-    marks += [pytest.mark.xfail(strict=True, reason=SHORT[name])] if name in SHORT else []
-    return pytest.param(name, marks=marks)
-
-
-EVERY = [marked(name) for name in SCENES]
+EVERY = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in SCENES]
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -168,6 +168,14 @@ def test_the_range_of_a_limit_that_acts_ends_where_another_node_meets_it():
     assert near.control == pytest.approx(along(low + 1e-3).path.control, abs=1e-6)
 
 
+def test_a_change_that_leads_far_beyond_a_limit_is_refused():
+    """A hundred times the mass takes a hundred times the force, which the limit does not let."""
+    answer = along(1.3)
+    assert predict(answer, mass=1.05).mass[0] == 1.05
+    with pytest.raises(ValueError, match="mass=100 is too far from the answer"):
+        predict(answer, mass=100)
+
+
 def test_a_free_duration_is_worth_something_where_its_end_acts():
     """At unit force the least time over 1 m is 2 s; where 1.8 s is the most, there is none."""
     problem = TransferProblem(**(ALONG | {"duration": (1.0, 3.0)}), actuator=BoxForce(3.0))

@@ -160,6 +160,15 @@ def test_every_answer_is_flown_with_errors(push, here):
         dmoc.sweep(push, {"duration": [2, 4]}, "bad.nc", order=4, steps=8, errors={"force": -1.0})
 
 
+def test_a_point_whose_time_is_over_is_data_and_no_answer(push, here, capfd):
+    data = dmoc.sweep(str(push), {"mass": "1:2:2"}, "map.nc", time_limit=1e-9)
+    assert not data["success"].any() and all("time limit of 1e-09 s" in one for one in data["message"].values)
+    assert data.attrs["time_limit"] == 1e-9
+    assert run("sweep", push, "--vary", "mass=1:2:2", "--time-limit", "0", "--out", "n.nc") == 2
+    assert "time_limit must be" in capfd.readouterr().err
+    assert run("sweep", push, "--vary", "mass=1:2:2", "--time-limit", "60", "--out", "n.nc") == 0
+
+
 def test_a_sample_has_its_points_along_one_dimension(push, here):
     data = dmoc.sweep(push, {"duration": (3, 8), "mass": "1:2"}, "out.nc", sample=5, order=4, steps=6)
     assert dict(data.sizes) == {"sample": 5} and data.mass.dims == ("sample",)

@@ -32,7 +32,6 @@ from dmoc import (
     Time,
     Torque,
     TransferProblem,
-    Via,
     Wrench,
     solve,
     verify,
@@ -418,7 +417,6 @@ def test_a_solution_is_saved_to_the_last_bit(tmp_path):
 
 ONE = TransferProblem(1.0, at_rest(1, 0), at_rest(-1, 0), 10.0)
 TWO = replace(ONE, start=at_rest(-1, 0), goal=at_rest(1, 0))
-LEGS = Mission(1.0, ONE.start, ONE.goal, [Leg((1, 9)), Via((0, 1)), Leg((1, 9))], duration=10.0)
 ON_A_LINE = [TransferProblem(1.0, at_rest(x), at_rest(-x), 10.0) for x in (-1.0, 1.0)]
 SPUN = TransferProblem(
     1.0,
@@ -437,7 +435,6 @@ def twin(evidence):
 REFUSED = {
     "two or more transfers": lambda: Team([ONE]),
     r"members\[1\] must be a dmoc.TransferProblem": lambda: Team([ONE, 3]),
-    r"members\[1\] is a mission of several legs": lambda: Team([ONE, LEGS]),
     r"members\[0\] has an attitude alone": lambda: Team([SPUN, SPUN]),
     "a sequence of dmoc.Apart and Meet": lambda: Team([ONE, TWO], [3]),
     "names must be 2 words": lambda: Team([ONE, TWO], names=("a", "a")),
