@@ -15,8 +15,8 @@ from dmoc.rungs.rung import Rung
 from dmoc.scene.problem import TransferProblem
 
 # Where not the time alone is least, an attempt at full force ends after this many iterations: those that get
-# there take 5 to 12.
-MOST_AT_FULL = 30
+# there take 5 to 28.
+MOST_AT_FULL = 60
 
 
 def at_full_force(
