@@ -15,6 +15,8 @@ from dmoc.shots.soonest import full_controls, least_time
 
 # A likely duration is so many times that which full thrust throughout takes [-].
 LIKELY = 1.2
+# A force is the largest up to this part of it [-], which it may lose where it turns between two nodes.
+FULL = 1e-3
 
 
 def shot_guess(
@@ -26,6 +28,12 @@ def shot_guess(
         if (path := found(problem, *on)) is not None:
             return path
     return None
+
+
+def is_full(problem: TransferProblem, guess: DiscretePath) -> bool:
+    """Whether the force of a guess is as large as it may be all along."""
+    limit, force = problem.actuator.force_limit(), guess.control[:, : problem.dimension]
+    return limit is not None and bool(np.isclose(np.linalg.norm(force, axis=1), limit, rtol=FULL).all())
 
 
 def soonest_to_orbit(

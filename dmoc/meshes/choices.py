@@ -9,6 +9,7 @@ import numpy as np
 
 from dmoc.guess.chart import is_curved
 from dmoc.guess.coast import MANY_TURNS, VERY_MANY_TURNS
+from dmoc.guess.shot import is_full
 from dmoc.guess.starting import angle_around, starting_guess
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.mesh import uniform_mesh
@@ -128,12 +129,6 @@ def first_path(
         enough = max(DEFAULT_STEPS[order], steps_past(problem, first, order))
         return graded_guess(problem, steps or enough, order, hold, guess)
     return first
-
-
-def is_full(problem: TransferProblem, guess: DiscretePath) -> bool:
-    """Whether the force of a guess is as large as it may be all along."""
-    limit, force = problem.actuator.force_limit(), guess.control[:, : problem.dimension]
-    return limit is not None and bool(np.isclose(np.linalg.norm(force, axis=1), limit).all())
 
 
 def _unstable_angle(problem: TransferProblem, guess: DiscretePath) -> float:

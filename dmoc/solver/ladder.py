@@ -227,8 +227,7 @@ class Ladder:
             guess = replace(guess, multipliers={})
         # In the unknowns of a chart Ipopt does not leave the guess for other revolutions.
         if is_curved(problem, guess):
-            curved = partial(self._attempt, guess, limits=limits)
-            return at_full_force(curved, problem, guess) or curved(problem)
+            return self._attempt(guess, problem, limits)
         near = in_tube(problem, guess)
         onward = barrier_from(problem, guess) | limits
         if near is not None and (tubed := self._attempt(guess, near, HALFWAY | limits)).solved:
@@ -236,10 +235,11 @@ class Ladder:
         here = partial(self._attempt, problem=problem, limits=onward)
         return led(here(guess), self.ask, problem, guess, here)
 
-    def _attempt(self, guess: DiscretePath, problem: TransferProblem, *args: Any, **how: Any) -> Rung:
+    def _attempt(self, guess: DiscretePath, problem: TransferProblem, limits: Any = None, **how: Any) -> Rung:
         """One attempt, and more where its answer hardly takes the force that its units were made for."""
-        rung = self._run(guess, problem, *args, **how)
-        return rung if how.get("lean") else settled(rung, lambda path: self._run(path, problem, *args, **how))
+        run = partial(self._run, guess, **how)
+        rung = at_full_force(run, problem, guess, limits or {}) or run(problem, limits)
+        return rung if how.get("lean") else settled(rung, lambda path: self._run(path, problem, limits, **how))
 
     def _run(
         self,
