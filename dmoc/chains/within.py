@@ -135,7 +135,11 @@ def _met(program: Program, constraint: Any, of_speed: bool, state: tuple[np.ndar
     values, lower, upper = made
     found = values(*(np.nan_to_num(part) for part in state)).full().ravel()
     slack = KEPT * np.maximum(1.0, np.abs(found))
-    return bool(((lower - slack <= found) & (found <= upper + slack)).all())
+    if ((lower - slack <= found) & (found <= upper + slack)).all():
+        return True
+    # A row may be a square or a ratio: what a scene lets pass as rounding of its numbers is none of more.
+    excess = constraint.excess_at(np.zeros(1), *(np.nan_to_num(part)[None] for part in state))
+    return bool(excess[0] <= KEPT * np.abs(state[1] if constraint.limits_speed else state[0]).max())
 
 
 def _limit(

@@ -237,7 +237,7 @@ class Ladder:
 
     def _attempt(self, guess: DiscretePath, problem: TransferProblem, limits: Any = None, **how: Any) -> Rung:
         """One attempt, and more where its answer hardly takes the force that its units were made for."""
-        run = partial(self._run, guess, **how)
+        run: Callable[..., Rung] = partial(self._run, guess, **how)
         rung = at_full_force(run, problem, guess, limits or {}) or run(problem, limits)
         return rung if how.get("lean") else settled(rung, lambda path: self._run(path, problem, limits, **how))
 

@@ -275,6 +275,18 @@ def tumbling(legs):
     return Mission(10.0, *ends, legs, actuator=Wrench(5.0, 5.0), inertia=(1.0, 2.0, 2.5))
 
 
+def test_a_start_that_lies_on_a_zone_to_the_rounding_of_its_numbers_is_left_to_itself():
+    # The row of the zone is a square, which is off by twice as much as the distance that a scene lets pass.
+    start, goal = State((1 + 5e-10, 0), (0, 0)), State((8, 0), (0, 0))
+    leg = Leg((1.0, 9.0))
+    zone = KeepOut((2, 0), 1.0)
+    mission = Mission(
+        1.0, start, goal, [leg, Via((5, 1)), leg], duration=10.0, constraints=[zone], actuator=BallForce(5.0)
+    )
+    found = dmoc.solve(mission)
+    assert found.success and dmoc.verify(found).ok
+
+
 def test_a_body_that_turns_flies_two_legs_as_it_flies_one():
     whole = tumbling([Leg(6.0)]).alone
     one = dmoc.solve(whole, order=4, mesh=[0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.0])
