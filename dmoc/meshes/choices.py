@@ -102,7 +102,7 @@ def first_path(
     mesh: Any = None,
 ) -> DiscretePath:
     """The guess on the last mesh; order and steps that are not given are those that the motion needs."""
-    unpaid = steps is None and mesh is None and burns_unpaid(problem)
+    asked, unpaid = order, steps is None and mesh is None and burns_unpaid(problem)
     if (problem.turns or problem.links or unpaid) and not hold:
         order = order or ORDER_OF_TURNING
     ends = check_mesh(DEFAULT_STEPS[order or 2] if steps is None else steps, mesh)
@@ -117,6 +117,8 @@ def first_path(
         turns, errors_add_up = fastest / (2 * np.pi), 1.0
     if steps is None and turns > MANY_TURNS:
         many = ORDER_OF_MANY_TURNS if turns < MOST_TURNS_OF_ORDER_6 else ORDER_OF_MORE_TURNS
+        # Over many revolutions no thrust is reversed.
+        order = asked if unpaid else order
         order = order or (2 if hold else many)
         a_turn = A_TURN_AT_FULL.get(order, A_TURN[order]) if is_full(problem, first) else A_TURN[order]
         steps = max(DEFAULT_STEPS[order], int(turns * a_turn * (errors_add_up**0.5 if order == 2 else 1)))
