@@ -1,7 +1,7 @@
 """How fast dmoc is, end to end (build and solve), against the methods of scripts/alternatives.py.
 
     ./scripts/run python scripts/benchmark.py                 under three minutes
-    ./scripts/run python scripts/benchmark.py --json out.json --largest 100000
+    ./scripts/run python scripts/benchmark.py --json out.json --largest 1000000
     ./scripts/run python scripts/benchmark.py --peers         beside ASSET and CasADi by hand, eight minutes
     ./scripts/run python scripts/benchmark.py --peers --write  and into docs/peers.md
 
@@ -234,7 +234,7 @@ def measure(largest: int) -> dict[str, Any]:
     results["equal error"] = [equal_error(name, problem) for name, problem in smooth_problems().items()]
     for found in results["equal error"]:
         show_equal_error(found)
-    results["parts"] = [parts_of_a_solve(n) for n in (50, 400, 3200, 25_600, 100_000) if n <= largest]
+    results["parts"] = [parts_of_a_solve(n) for n in (50, 400, 3200, 25_600, 100_000, 1_000_000) if n <= largest]
     show_parts(results["parts"])
     show_verdicts(verdicts(results))
     return results
@@ -253,7 +253,7 @@ def beside_peers(repeats: int, asset: str, write: bool) -> list[dict[str, Any]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures here")
-    parser.add_argument("--largest", type=int, default=25_600, help="most steps to take apart (100000: slow)")
+    parser.add_argument("--largest", type=int, default=25_600, help="most steps to take apart (1000000: slow)")
     peers = parser.add_argument_group("beside ASSET and CasADi by hand")
     peers.add_argument("--peers", action="store_true", help="measure these, and nothing else")
     peers.add_argument("--repeats", type=int, default=9, help="processes of each run; medians count")
