@@ -234,7 +234,9 @@ def measure(largest: int) -> dict[str, Any]:
     results["equal error"] = [equal_error(name, problem) for name, problem in smooth_problems().items()]
     for found in results["equal error"]:
         show_equal_error(found)
-    results["parts"] = [parts_of_a_solve(n) for n in (50, 400, 3200, 25_600, 100_000, 1_000_000) if n <= largest]
+    results["parts"] = [
+        parts_of_a_solve(n) for n in (50, 400, 3200, 25_600, 100_000, 1_000_000) if n <= largest
+    ]
     show_parts(results["parts"])
     show_verdicts(verdicts(results))
     return results
