@@ -150,8 +150,8 @@ def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> 
             # three iterations on 700 steps took 49 s, like this 2 s.
             settings |= {"ipopt.mumps_pivtol": 1e-13, "ipopt.mumps_pivtolmax": 1e-8}
         elif _meters(problem) and _turns(problem) > VERY_MANY_TURNS:
-            # Where thrust is all or nothing pivots are delayed, too: over 200 revolutions the first iteration did
-            # not end.
+            # Where thrust is all or nothing pivots are delayed, too: over 200 revolutions the first iteration
+            # did not end.
             settings["ipopt.mumps_pivtol"] = 1e-10
     elif problem.limited:
         # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
