@@ -12,6 +12,7 @@ import pytest
 
 from dmoc import solve
 from dmoc.guess.starting import starting_guess
+from dmoc.ipopt.options import rounding, tolerance
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.scene.problem_file import catalogue, load_problem
 from dmoc.solver.ladder import Ladder
@@ -142,3 +143,10 @@ def test_a_fine_smooth_mesh_is_one_iteration_away_from_a_coarse_one_of_order_six
 
 if __name__ == "__main__":
     record()
+
+
+def test_a_large_mesh_asks_for_no_more_than_rounding_lets_it():
+    """A tolerance below it is never met, and Ipopt goes on: a million steps took 17 iterations, not one."""
+    for steps in (20_000, 1_000_000):
+        mesh = uniform_mesh(steps)
+        assert tolerance(mesh, 1, False) == rounding(mesh, 1)
