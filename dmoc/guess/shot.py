@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from dmoc.guess.coast import VERY_MANY_TURNS, controls_for
@@ -55,12 +57,8 @@ def soonest_to_orbit(
     found = least_time(problem, float(duration), start)
     if found is None or not shortest <= found[0] <= longest:
         return None
-    duration, path = found
-    position, velocity, force, mass = path(node_fractions(mesh, scheme(order)))
-    position[0], control = start[0], _controls_of(problem, force, mesh, order, hold)
-    if control is None or mass[-1] < problem.actuator.dry_mass:
-        return None
-    return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])
+    flown = _flown(problem, mesh, order, hold, *found)
+    return None if flown is None or flown.mass[-1] < problem.actuator.dry_mass else flown
 
 
 def least_effort_of_many_turns(
@@ -99,15 +97,17 @@ def least_effort_to_orbit(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
 ) -> DiscretePath | None:
     """The path of least effort from a known state to an open place on an orbit; None if none is found."""
+    path = least_effort(problem, duration, problem.start.fixed()) if _shoots(problem) else None
+    return None if path is None else _flown(problem, mesh, order, hold, duration, path)
+
+
+def _flown(
+    problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float, path: Callable
+) -> DiscretePath | None:
+    """What a shot flies on a mesh; None where the controls do not follow from the force."""
     start = problem.start.fixed()
-    if not _shoots(problem):
-        return None
-    path = least_effort(problem, duration, start)
-    if path is None:
-        return None
     position, velocity, force, mass = path(node_fractions(mesh, scheme(order)))
-    position[0] = start[0]
-    control = _controls_of(problem, force, mesh, order, hold)
+    position[0], control = start[0], _controls_of(problem, force, mesh, order, hold)
     if control is None:
         return None
     return DiscretePath(mesh, order, hold, duration, position, control, mass, start[1], velocity[-1])

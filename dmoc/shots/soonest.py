@@ -17,6 +17,7 @@ from dmoc.scene.problem import TransferProblem
 from dmoc.shots.extremal import (
     CLOSE,
     MET,
+    MOST_SHOTS,
     MOST_STEPS,
     PATH_TOLERANCE,
     SHOT_TOLERANCE,
@@ -31,9 +32,8 @@ from dmoc.shots.extremal import (
 # From one shot to the next the thrust turns by at most this at either end of the path [rad], and the duration
 # changes by at most this part [-]: over many revolutions slopes tell little of larger changes.
 MOST_TURNED, MOST_LONGER = 0.5, 0.02
-# A search ends after this many shots, those that arrive take 5 to 15, or where the goal is missed by this [-]:
-# the thrust has then turned round on the way.
-MOST_SHOTS, FAR_OFF = 25, 1e-2
+# A search ends where the goal is missed by this [-]: the thrust has then turned round on the way.
+FAR_OFF = 1e-2
 # The mean thrust is that of so many places.
 PLACES = 2001
 

@@ -1,5 +1,7 @@
 """Where a guess has the largest force throughout, its direction alone is sought first."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,14 @@ def test_an_answer_at_full_force_that_a_smaller_one_betters_is_left():
     problem = largest_radius(Fuel())
     found = solve(problem, order=6, steps=20, guess=spiral())
     assert found.status == "solved" and found.objective < 0.5 * FLOW * DURATION
+
+
+def test_a_guess_whose_force_is_reversed_is_solved_as_ever(monkeypatch):
+    """A polynomial cannot be of full size on both sides of a switch and between them."""
+    asked = []
+    monkeypatch.setattr(full, "gains_nothing", lambda *given: asked.append(given) or True)
+    guess = spiral()
+    control = guess.control.copy()
+    control[len(control) // 2 :, :2] *= -1
+    assert solve(largest_radius(), order=8, steps=14, guess=replace(guess, control=control)).status == "solved"
+    assert not asked
