@@ -19,6 +19,7 @@ from dmoc import (
     BallForce,
     BallTorque,
     BoxForce,
+    CircularOrbit,
     ClohessyWiltshire,
     Constraint,
     Engine,
@@ -34,6 +35,7 @@ from dmoc import (
     Moving,
     Nozzles,
     On,
+    PointGravity,
     PointingKeepIn,
     PointingKeepOut,
     Pose,
@@ -98,6 +100,17 @@ def loaded(dry):
 def half(dry):
     """The dry mass that leaves half of the propellant: how much more than needed is named is not said."""
     return (1.7 - 0.5 * (1.7 - dry),)
+
+
+def raised(dry):
+    """To a larger circular orbit: in a longer time an engine needs hardly less propellant."""
+    engine = Engine(0.15, exhaust_velocity=1.8, dry_mass=dry)
+    ends = State((1.0, 0.0), (0.0, 1.0)), CircularOrbit(1.3, mu=1.0)
+    return TransferProblem(1.0, *ends, 5.0, effects=[PointGravity(1.0)], actuator=engine)
+
+
+def half_of_raised(dry):
+    return (1.0 - 0.5 * (1.0 - dry),)
 
 
 def under(radius, **more):
@@ -249,6 +262,12 @@ SCENES = {
         [((0, 1), THRUST + ".*? and a force limit of # N [(].*? along each axis")],
     ),
     "dry mass": (loaded, (1.64,), {"steps": 100}, [((0,), "a dry mass of # kg [(]", half)]),
+    "dry mass around an attractor": (
+        raised,
+        (0.98,),
+        {},
+        [((0,), "a dry mass of # kg [(]you gave 0.98 kg, which leaves too little propellant", half_of_raised)],
+    ),
     "speed": (
         lambda v, t: hop((10.0, 0.0), t, constraints=[SpeedLimit(v)]),
         (1.5, 5.0),
