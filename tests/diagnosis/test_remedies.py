@@ -59,6 +59,7 @@ from dmoc import (
     verify,
 )
 from dmoc.motion.stability import OPEN
+from dmoc.scene.problem_file import load_problem
 
 NUMBER = r"(-?[\d.]+(?:e[+-]?\d+)?)"
 J = (1.0, 2.0, 2.8)
@@ -527,3 +528,22 @@ def test_the_program_finds_steps_that_are_enough_where_few_are_refused(name):
 def test_a_scene_of_a_hundred_oscillations_is_not_refused_for_its_default_steps():
     """On 400 steps h omega would be 2.5."""
     assert holds(swung(Spring(100.0, (0.0, 0.0)), duration=100.0))
+
+
+def to_mars(dry):
+    """In least time, with an engine that burns throughout if it may."""
+    problem = load_problem("earth_mars").make()
+    return replace(problem, actuator=replace(problem.actuator, dry_mass=dry))
+
+
+def test_a_lack_of_propellant_is_named_before_much_else_is_tried():
+    """Half the propellant of the cheapest way, 0.095 kg: no rows of mass flow, and no thousand iterations."""
+    failed = solve(to_mars(0.95))
+    named = re.search("the transfer needs a dry mass of # kg".replace("#", NUMBER), failed.message)
+    assert named and 0.9 < float(named[1]) < 1 - 0.0954
+    assert sum(level.iterations for level in failed.ladder) < 1000
+
+
+@pytest.mark.slow
+def test_the_propellant_that_is_named_is_enough_in_least_time():
+    assert holds(to_mars(0.9))
