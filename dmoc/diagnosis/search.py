@@ -92,7 +92,8 @@ def cause_of(
     if (far := _far_off(transfer, brief)) is not None:
         return far
     # Around an attractor more time hardly saves propellant: it alone is then to blame.
-    if problem.attraction.sources and (lack := too_little_propellant(transfer)) is not None:
+    around = bool(problem.attraction.sources)
+    if around and not brief and (lack := too_little_propellant(transfer)) is not None:
         return lack
     limits = transfer.limits()
     if not limits:
@@ -100,7 +101,7 @@ def cause_of(
     joint = transfer.relaxed(*limits, least=LEAST)
     found = joint(transfer.problem, transfer.guess)
     if not found.feasible:
-        free = too_little_propellant(transfer) or unlimited(transfer)
+        free = (None if around else too_little_propellant(transfer)) or unlimited(transfer)
         if free is not None:
             return free
         rows = _rows(transfer)

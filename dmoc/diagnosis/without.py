@@ -21,7 +21,7 @@ from dmoc.scene.problem import TransferProblem
 # limit the slacks are so large that no solver finds them.
 FAR_OFF = 10.0
 # Least fuel is looked for with |F| rounded at zero over this part of the largest thrust [-]: from a guess Ipopt
-# wanders with less, and an engine that coasts burns so little that it hardly counts.
+# wanders with less, and with the far wider rounding of a first mesh an engine that coasts burns too much.
 ROUNDED = 1e-2
 
 
@@ -56,7 +56,7 @@ def too_little_propellant(transfer: Relaxable) -> Cause | None:
     if limit is None:
         return None
     given: Any = transfer.given.actuator
-    rounding = {} if given.smoothing is None else {"smoothing": max(ROUNDED, given.smoothing)}
+    rounding = {} if given.smoothing is None else {"smoothing": ROUNDED}
     problem = replace(transfer.problem, actuator=replace(given, dry_mass=0.0, **rounding), objective=Fuel())
     path = _answer(transfer, problem, "least fuel, and as much of it as there is")
     if path is None:
