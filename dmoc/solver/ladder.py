@@ -285,7 +285,10 @@ class Ladder:
         message = "a local optimum" if rung.solved else reason or advice_of(rung.answer.status, self.options)
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
-        return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
+        solution = rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
+        # What would be enough may have been left unproven.
+        late = not (rung.solved or reason) and self.interrupt.late
+        return rungs.cut_short(solution, self.interrupt.seconds, False) if late else solution
 
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""
