@@ -60,7 +60,7 @@ def test_what_is_named_where_a_check_fails_mends_it(name, way):
 
 # Problems whose answers on their usual mesh may be better, by the tolerance that is named.
 BETTER = ["orbit_raise", "free_flyer", "hovercraft", "point_to_point"]
-LONGER = ["acrobot", "goddard", "two_body_fuel", "astrobee", "hanging_chain"]
+LONGER = ["acrobot", "goddard", "two_body_fuel", "astrobee", "hanging_chain", "leo_raise", "dionysus"]
 
 
 @pytest.mark.parametrize("name", [*BETTER[:1], *(pytest.param(one, marks=SLOW) for one in BETTER[1:] + LONGER)])
@@ -73,6 +73,17 @@ def test_the_tolerance_that_is_named_for_better_is_met(name):
         return
     found = solve(made(name), tol=float(named[1])).raise_for_status()
     assert found.error.largest <= float(named[1]) and verify(found).ok
+
+
+@SLOW
+@pytest.mark.parametrize("name", ["leo_raise", "two_body_fuel"])
+def test_where_controls_switch_the_tolerance_that_is_named_takes_few_times_the_work(name):
+    """Work is iterations times steps; one that is a hundred times better takes thirty times as much or more."""
+    first = solve(made(name))
+    named = re.search(r"--tol (\S+) for better", verdict_words(first, verify(first)))
+    found = solve(made(name), tol=float(named[1]))
+    work = [sum(level.iterations * level.steps for level in one.ladder) for one in (first, found)]
+    assert found.success and work[1] < 10 * work[0]
 
 
 def stopped_by(**limits):

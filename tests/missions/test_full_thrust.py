@@ -88,3 +88,7 @@ def test_a_reversal_between_nodes_is_told_and_is_found_as_two_legs():
     found = solve(Mission(1.0, *ends, [Leg((0.1, 20.0)), Leg((0.1, 20.0))], **parts))
     # down with 1.3 m/s^2, then up with 0.7 m/s^2
     assert found.duration == pytest.approx(np.sqrt(2 * 5 * 0.7 / 1.3 / 2.0) * (1 + 1.3 / 0.7), rel=1e-4)
+    # The other remedy: an engine that may throttle coasts a moment where it turns.
+    other = solve(TransferProblem(1.0, *ends, (1.0, 20.0), **parts | {"actuator": Engine(1.0)}))
+    assert other.success and verify(other).ok
+    assert other.duration == pytest.approx(found.duration, rel=1e-3)

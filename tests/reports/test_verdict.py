@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from dmoc import solve, verify
+from dmoc import BoxForce, Fuel, State, TransferProblem, solve, verify
 from dmoc.checks.verification import CHECKS
 from dmoc.cli.app import main
 from dmoc.reports.verdict import REMEDIES, accuracy, verdict_words
@@ -26,6 +26,17 @@ def test_an_answer_of_order_2_does_not_seem_exact():
     assert 1e-3 * miss < better <= 1e-2 * miss
     finer, checked = answered(tol=better)
     assert accuracy(finer, checked) <= better and "for better" not in verdict_words(finer, checked)
+
+
+def test_where_controls_switch_a_tolerance_is_named_that_is_less_far():
+    ends = State((0, 0), (0, 0)), State((4, 1), (0, 0))
+    problem = TransferProblem(1.0, *ends, 6.0, actuator=BoxForce(1.0), objective=Fuel())
+    solution = solve(problem, order=2, steps=101)
+    report = verify(solution)
+    miss, words = report["reference"].value, verdict_words(solution, report)
+    better = float(words.split("--tol ")[1].split(" ")[0])
+    assert 1e-2 * miss < better <= 1e-1 * miss
+    assert solve(problem, tol=better).success
 
 
 def test_what_fails_names_what_to_try_and_that_helps():

@@ -4,11 +4,15 @@ The values that are right were found by `local_optima` from six to eight guesses
 eccentric orbits on meshes of two and four times the steps.
 """
 
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
+import casadi as ca
 import pytest
 
 from dmoc import BoxForce, Engine, Fuel, KeepOut, State, TransferProblem, load, solve, verify
+from dmoc.effects.base import Force
 from dmoc.scene.problem_file import load_problem
 
 CASES = Path(__file__).parents[1] / "cases"
@@ -57,3 +61,27 @@ def test_an_answer_with_a_sharper_magnitude_is_right_when_it_is_read_back(tmp_pa
     assert solution.provenance.smoothing < engine.smoothing
     solution.save(tmp_path / "found.nc")
     assert verify(load(tmp_path / "found.nc").attach(problem)).ok
+
+
+@dataclass(frozen=True)
+class Shaker(Force):
+    """A push that goes to and fro along x so fast that few steps do not see it."""
+
+    size: float
+    rate: float
+
+    def force(self, t, q, v, m):
+        return ca.vertcat(self.size * ca.cos(self.rate * t), 0)
+
+
+@SLOW
+def test_the_tolerance_that_is_named_where_the_mesh_stays_too_coarse_finds_one():
+    ends = State((0, 0), (0, 0)), State((1, 0.5), (0, 0))
+    problem = TransferProblem(1.0, *ends, 5.0, effects=[Shaker(30.0, 2000.0)])
+    missed = solve(problem)
+    assert "too coarse for this motion" in missed.warnings[0] and not verify(missed).ok
+    tol = float(re.search("--tol ([0-9.e-]+)", missed.warnings[0])[1])
+    found = solve(problem, tol=tol).raise_for_status()
+    assert verify(found).ok
+    # The push to and fro adds no impulse: the effort stays about 6 m^2 d^2 / T^3.
+    assert found.objective == pytest.approx(6 * 1.25 / 5.0**3, rel=0.05)

@@ -1,12 +1,18 @@
 """In a fixed time around an attractor, an answer of other revolutions that costs far less is found."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from dmoc import BallForce, PointGravity, State, TransferProblem, solve, verify
 from dmoc.scene.problem_file import load_problem
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.starts import local_optima
 
+FAILED = SimpleNamespace(status="iteration limit")
 SLOW = Path(__file__).parents[1] / "cases" / "eccentric_slow.py"
 
 
@@ -65,3 +71,17 @@ def test_what_the_user_gives_is_kept(given):
     own = solve(sooner(), mesh=mesh)
     found = own if given == "mesh" else solve(sooner(), guess=own)
     assert found.objective == pytest.approx(1.5638, rel=1e-2) and questions(found) == []
+
+
+def test_the_starts_that_are_named_for_a_way_that_is_missed_find_it(monkeypatch):
+    """The other way is known from its least effort, and leads nowhere on the mesh of the answer."""
+    with monkeypatch.context() as patch:
+        patch.setattr(Ladder, "refine_on", lambda ladder, *given: replace(ladder.rungs[-1], answer=FAILED))
+        missed = solve(sooner())
+    assert missed.objective == pytest.approx(1.5638, rel=1e-2)
+    cost, starts = re.search(
+        "may cost less, about (.*) N.2 s, .* try --starts ([0-9]+)", missed.warnings[-1]
+    ).groups()
+    best = local_optima(sooner(), int(starts))[0]
+    found = solve(sooner(), guess=best.path).raise_for_status()
+    assert found.objective == pytest.approx(float(cost), rel=1e-2) and verify(found).ok
