@@ -60,11 +60,11 @@ class Cause:
         """Whether no finer mesh can help."""
         return self.shown or (HOPELESS < self.excess < np.inf and not self.coarse)
 
-    def proven(self, holds: Callable[[TransferProblem], bool]) -> Cause:
+    def proven(self, holds: Callable[[Remedy], bool]) -> Cause:
         """The same with those changes alone that are enough, as `holds` finds, each as small as that may be."""
         if self.shown:
             return self
-        found = (next((one for one in need if holds(one.problem)), None) for need in self.needs)
+        found = (next((one for one in need if holds(one)), None) for need in self.needs)
         return replace(self, needs=tuple((one,) for one in found if one is not None))
 
     def words(self, local: bool = False) -> str:

@@ -18,17 +18,19 @@ from dmoc.scene.problem import TransferProblem
 # A limit on force, speed or propellant is told of with this much more than is needed [-]: at the very least one
 # every force is at its limit, and no multipliers confirm the answer.
 ROOM = 1e-3
-# Where a limit as found turns out not to be enough, this much more is tried [-]: at the very least limit a path
-# touches it all the way, or slips between two limits where there is no room to either side.
-LOOSER = (0.0, 0.004, 0.02, 0.08, 0.2)
+# A limit is told of with this much more than was found or, where that turns out not to be enough, with the next
+# of these [-]: at the very least limit a path touches it all the way, or slips between two limits where there is
+# no room to either side, and from another guess nothing leads there.
+LOOSER = (0.004, 0.02, 0.08, 0.2)
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that should be enough: in words, with its numbers, and the problem with that change."""
+    """A change that should be enough: in words, with its numbers, the problem with that change, a path near it."""
 
     words: str
     problem: TransferProblem
+    path: DiscretePath | None = None
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Limits:
         return [limit for limit in (self.force(), *self.speeds(), self.propellant()) if limit is not None]
 
     def remedies(
-        self, limits: list[Giving], slack: float, more: str = "", room: float = ROOM
+        self, limits: list[Giving], slack: float, more: str = "", room: float = ROOM, path: DiscretePath | None = None
     ) -> tuple[Remedy, ...]:
         """Limits that give way together by this slack and, should it not be enough, by more each time."""
         found = []
@@ -80,7 +82,7 @@ class Limits:
             problem = self.given
             for limit in limits:
                 problem = limit.change(problem, given)
-            found.append(Remedy(" and ".join(words) + more, problem))
+            found.append(Remedy(" and ".join(words) + more, problem, path))
         return tuple(found)
 
     def force(self) -> Giving | None:

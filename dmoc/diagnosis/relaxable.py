@@ -108,7 +108,7 @@ class Relaxable(Limits):
         """
         first_duration = self.problem.duration_bounds[0]
         tried = [(0.0, float(np.log1p(first.slack[0])))]
-        step, near, enough = 0.5 * tried[0][1], first, None
+        step, near, enough, kept = 0.5 * tried[0][1], first, None, first.path
         for _ in range(MOST_DURATIONS):
             place = tried[-1][0] + float(np.clip(step, -WIDEST, WIDEST))
             duration = float(first_duration * np.exp(place))
@@ -118,7 +118,7 @@ class Relaxable(Limits):
                 break
             tried.append((place, float(np.log1p(near.slack[0]))))
             if near.slack[0] <= 0:
-                enough = place
+                enough, kept = place, near.path
             if -2 * EXACT <= near.slack[0] <= 0:
                 break
             (before, above), (place, below) = tried[-2:]
@@ -127,9 +127,9 @@ class Relaxable(Limits):
             step = -(below + EXACT) / slope if slope else WIDEST
         if enough is None:
             return []
-        return [self._lasting(first_duration * np.exp(enough), given)]
+        return [self._lasting(first_duration * np.exp(enough), given, kept)]
 
-    def _lasting(self, needed: float, given: float) -> tuple[Remedy, ...]:
+    def _lasting(self, needed: float, given: float, path: DiscretePath) -> tuple[Remedy, ...]:
         """This duration and, should it not be enough, durations a little further off the one given."""
         (size, unit), found = time_unit(given), []
         for looser in LOOSER:
@@ -138,7 +138,7 @@ class Relaxable(Limits):
             shortest = self.given.duration_bounds[0]
             bounds = (shortest, lasting) if self.given.free_duration and shortest < lasting else lasting
             problem = replace(self.given, duration=bounds)
-            found.append(Remedy(f"{told} {unit} (you gave {given / size:g} {unit})", problem))
+            found.append(Remedy(f"{told} {unit} (you gave {given / size:g} {unit})", problem, replace(path, duration=lasting)))
         return tuple(found)
 
     def leaps(self, path: DiscretePath) -> bool:

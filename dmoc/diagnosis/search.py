@@ -117,10 +117,10 @@ def cause_of(
     for limit in limits:
         alone = found if len(limits) == 1 else transfer.relaxed(limit)(transfer.problem, found.path)
         more = "" if alone.exact else ", which is more than enough"
-        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0], more)):
+        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0], more, path=alone.path)):
             needs.append(enough)
     # Limits of which none is enough alone may be so together.
-    every = transfer.remedies(limits, found.slack[0]) if found.exact and not needs else ()
+    every = transfer.remedies(limits, found.slack[0], path=found.path) if found.exact and not needs else ()
     needs += transfer.durations(joint, found, transfer.problem.duration_bounds[1])
     if not needs:
         rows = _rows(transfer)
@@ -162,7 +162,7 @@ def _far_off(transfer: Relaxable, brief: bool) -> Cause | None:
     excess = max(limit.factor(found.slack[0]) for limit in limits)
     if brief:
         return Cause(excess=excess)
-    needs = [higher.remedies(limits, found.slack[0])]
+    needs = [higher.remedies(limits, found.slack[0], path=found.path)]
     longer = longest * max(limit.factor(found.slack[0]) ** (1 / limit.falls) for limit in limits)
     later = Relaxable(
         replace(problem, duration=longer), transfer.guess, transfer.tell, transfer.interrupt, given=problem
@@ -182,7 +182,7 @@ def _one_alone(transfer: Relaxable, limits: list[Giving]) -> Cause | None:
         return None
     for limit in limits:
         alone = transfer.relaxed(limit)(transfer.problem, transfer.guess)
-        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0])):
+        if alone.feasible and (enough := transfer.remedies([limit], alone.slack[0], path=alone.path)):
             return Cause(needs=(enough,), excess=float(alone.slack[0]))
     return None
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.diagnosis.cause import Cause
+from dmoc.diagnosis.giving import Remedy
 from dmoc.ipopt.run import STATUSES, Answer
 from dmoc.meshes.widths import WIDEST_ROUNDING, WIDEST_UNPAID
 from dmoc.motion.path import DURATION, DiscretePath
@@ -130,7 +131,7 @@ def settled(made: Any, again: Callable[[Any], Any]) -> Any:
     return made
 
 
-def told(cause: Cause, problem: TransferProblem, holds: Callable[[TransferProblem], bool] | None) -> str:
+def told(cause: Cause, problem: TransferProblem, holds: Callable[[Remedy], bool] | None) -> str:
     """A cause in words, with remedies that hold, if there is somebody to say which do."""
     # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
     local = problem.attraction.first is not None and problem.attraction.lone is None

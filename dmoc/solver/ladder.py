@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dmoc.diagnosis.cause import Cause
+from dmoc.diagnosis.giving import Remedy
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
 from dmoc.diagnosis.search import confirmed_cause, lacks_propellant
 from dmoc.guess.chart import chart_of, is_curved
@@ -62,7 +63,7 @@ class Ladder:
         self.problem, self.options, self.progress, self.compiled = problem, options, progress, compiled
         self.dynamics, self.interrupt = Dynamics.of(problem), Interrupt(time_limit)
         # Whether a problem that a message names has an answer, if somebody can say.
-        self.holds: Callable[[TransferProblem], bool] | None = None
+        self.holds: Callable[[Remedy], bool] | None = None
         self.patient = True  # a finer mesh is tried where a coarse one has no path
         self._limited = any("max_" in name for name in options or ())
         self.rungs, self._levels = list[Rung](), list[Level]()  # all attempts so far
