@@ -73,7 +73,7 @@ def test_it_is_worth_what_the_objective_lacks(name):
 
 @pytest.mark.parametrize("tol", [1e-4, pytest.param(1e-6, marks=pytest.mark.slow)])
 def test_two_meshes_that_share_the_node_at_a_zone_do_not_tell_their_error(tol):
-    """The first two are off by 1.5e-5 and differ by 1e-10. Arcs that touch the zones exactly have the optimum."""
+    """The first two are off by 1.5e-5 and differ by 1e-10. Arcs that touch the zones have the optimum."""
     problem, *_ = SCENES["two spheres"]
     exact = solve(problem, order=4, steps=40, structure=True).raise_for_status()
     assert len(exact.legs) > 1

@@ -51,14 +51,16 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", ["into a zone", "slowly and aslant", "out of a box", "a cone"])
 def test_no_path_goes_on_from_there(name):
-    with pytest.raises(ValueError, match=r"^start is on the edge of \w+ \(constraint 1\) and goes on beyond it"):
+    with pytest.raises(
+        ValueError, match=r"^start is on the edge of \w+ \(constraint 1\) and goes on beyond it"
+    ):
         REFUSED[name]()
 
 
 def test_a_mission_names_the_leg():
-    with pytest.raises(ValueError, match="^leg 1: start is on the edge .* or turn its velocity"):
+    with pytest.raises(ValueError, match=r"^leg 1: start is on the edge .* or turn its velocity"):
         mission(State((1, 0), (0.5, 0)), FAR, ASIDE)
-    with pytest.raises(ValueError, match="^leg 2: goal is on the edge .* and comes from beyond it"):
+    with pytest.raises(ValueError, match=r"^leg 2: goal is on the edge .* and comes from beyond it"):
         mission(State((0, 0), (0, 0)), State((3, 0), (0.5, 0)), ASIDE)
 
 
