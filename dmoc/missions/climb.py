@@ -235,7 +235,7 @@ class Climb:
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
             # Of arcs nothing is left to be found, but in other missions errors tell where limits set in.
-            onto = attempt.path.finer(attempt.to_cut(tol or accurate) if self.sharp else attempt.errors)
+            onto = attempt.path.finer(attempt.to_cut(tol or accurate, self.sharp, tol is not None))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS or self.work > self.most_work:
                 break
             found = self.on_finer(onto)
@@ -263,7 +263,7 @@ class Climb:
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
-        return Error(summed, left_after(changes), attempt.missed)
+        return attempt.counted(Error(summed, left_after(changes), attempt.missed))
 
 
 def solve_mission(
