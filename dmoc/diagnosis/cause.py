@@ -9,7 +9,6 @@ import numpy as np
 
 from dmoc.diagnosis.giving import Remedy
 from dmoc.motion.path import DiscretePath
-from dmoc.scene.problem import TransferProblem
 
 # The ladder ends on a coarse mesh if the transfer needs over 5 % more than its limits [-]: a little may be due
 # to the mesh, and a finer one is then worth its time.

@@ -18,15 +18,14 @@ from dmoc.scene.problem import TransferProblem
 # A limit on force, speed or propellant is told of with this much more than is needed [-]: at the very least one
 # every force is at its limit, and no multipliers confirm the answer.
 ROOM = 1e-3
-# A limit is told of with this much more than was found or, where that turns out not to be enough, with the next
-# of these [-]: at the very least limit a path touches it all the way, or slips between two limits where there is
-# no room to either side, and from another guess nothing leads there.
-LOOSER = (0.004, 0.02, 0.08, 0.2)
+# Where a limit as found turns out not to be enough, this much more is tried [-]: at the very least limit a path
+# touches it all the way, or slips between two limits where there is no room to either side.
+LOOSER = (0.0, 0.004, 0.02, 0.08, 0.2)
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that should be enough: in words, with its numbers, the problem with that change, a path near it."""
+    """A change that should be enough: in words, the problem with that change, a path that is near it."""
 
     words: str
     problem: TransferProblem
@@ -69,12 +68,22 @@ class Limits:
         """The limits that a longer duration eases."""
         return [limit for limit in (self.force(), *self.speeds(), self.propellant()) if limit is not None]
 
+    @property
+    def looser(self) -> tuple[float, ...]:
+        """`LOOSER`; with a limit on the speed nothing but the path that was found leads to the very least."""
+        return LOOSER[1:] if any(part.largest_speed() for part in self.given.constraints) else LOOSER
+
     def remedies(
-        self, limits: list[Giving], slack: float, more: str = "", room: float = ROOM, path: DiscretePath | None = None
+        self,
+        limits: list[Giving],
+        slack: float,
+        more: str = "",
+        room: float = ROOM,
+        path: DiscretePath | None = None,
     ) -> tuple[Remedy, ...]:
         """Limits that give way together by this slack and, should it not be enough, by more each time."""
         found = []
-        for looser in LOOSER:
+        for looser in self.looser:
             given = (1 + slack) * (1 + room + looser) - 1
             words = [limit.told(given) for limit in limits]
             if not all(words):

@@ -10,7 +10,7 @@ import numpy as np
 from dmoc.basics.digits import down, time_unit, up
 from dmoc.basics.quaternions import normalised
 from dmoc.diagnosis.elastic import Relaxation, Relaxed
-from dmoc.diagnosis.giving import LOOSER, Giving, Limits, Remedy
+from dmoc.diagnosis.giving import Giving, Limits, Remedy
 from dmoc.ipopt.run import Interrupt
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import NLP
@@ -132,13 +132,19 @@ class Relaxable(Limits):
     def _lasting(self, needed: float, given: float, path: DiscretePath) -> tuple[Remedy, ...]:
         """This duration and, should it not be enough, durations a little further off the one given."""
         (size, unit), found = time_unit(given), []
-        for looser in LOOSER:
+        for looser in self.looser:
             lasting = needed * (1 + looser if needed > given else 1 / (1 + looser))
             told = (up if needed > given else down)(lasting / size)
             shortest = self.given.duration_bounds[0]
             bounds = (shortest, lasting) if self.given.free_duration and shortest < lasting else lasting
             problem = replace(self.given, duration=bounds)
-            found.append(Remedy(f"{told} {unit} (you gave {given / size:g} {unit})", problem, replace(path, duration=lasting)))
+            found.append(
+                Remedy(
+                    f"{told} {unit} (you gave {given / size:g} {unit})",
+                    problem,
+                    replace(path, duration=lasting),
+                )
+            )
         return tuple(found)
 
     def leaps(self, path: DiscretePath) -> bool:

@@ -24,9 +24,9 @@ REMEDIES = {
     "together": FINER,
     "stability": "more steps: h omega must come below the limit of the order",
 }
-# A tolerance that is better than the accuracy of an answer by this factor is named [-]; where controls switch by
-# the second one, as no order makes the error fall fast there: two low thrust transfers meet that in 9 and 6 s,
-# and one that is better by the first one not in a minute.
+# A tolerance that is better than the accuracy of an answer by this factor is named [-]; where controls switch,
+# by the second one, as no order makes the error fall fast there: two low thrust transfers meet that in 9 and
+# 6 s, and one that is better by the first one not in a minute.
 BETTER, SWITCHING = 100.0, 10.0
 # No better tolerance is named where an answer is as accurate as this [-].
 ACCURATE = 1e-6

@@ -21,8 +21,8 @@ FINER = ("reference", "ledger")
 def holds(ladder: Ladder, remedy: Remedy, solved: Callable[[Ladder], Solution]) -> bool:
     """Whether a changed problem is solved in the way that the one of a ladder was, and every check holds.
 
-    Where a path is known that keeps all of its limits, it is solved from there on the mesh of that path: a solve
-    from the usual guess that leads nowhere finds the same path when it looks for the cause.
+    Where a path is known that keeps all of its limits, it is solved from there on the mesh of that path: a
+    solve from the usual guess that leads nowhere finds the same path when it looks for the cause.
 
     An attempt of a trial ends after few iterations, as the first one of any solve does. A trial ends with the
     first mesh that fails, which is mostly the one on which the remedy was found; but where |F| is rounded, more
