@@ -67,7 +67,7 @@ def lacks(found):
 def test_it_is_worth_what_the_objective_lacks(name):
     problem, order, steps = SCENES[name]
     coarse = solve(problem, order=order, steps=steps, structure=False).raise_for_status()
-    fine = solve(problem, order=4, steps=100, structure=False).raise_for_status()
+    fine = solve(problem, order=4, steps=160, structure=False).raise_for_status()
     lost = fine.objective - coarse.objective
     # The optimum lies between the objective of the fine mesh and that with what it lacks.
     assert 0 < lost <= 1.1 * lacks(coarse) and lacks(coarse) <= 2 * (lost + lacks(fine))
