@@ -239,17 +239,18 @@ def refuse_unstable(
 
 
 def stable_from(
-    dynamics: Dynamics, guess: DiscretePath, start_time: float, duration: float
+    dynamics: Dynamics, guess: DiscretePath, start_time: float, duration: float, steps: int = 1
 ) -> tuple[int, float]:
     """From how many equal steps on a scheme is stable, and the angle [rad] of the fastest motion in that time.
 
-    Both are 0 where they are not known before the solve.
+    Both are 0 where they are not known before the solve, or where so many `steps` are harmless.
     """
-    tried = _constant_growth(dynamics, guess, start_time, np.array([duration]), np.ones(1))
+    tried = _constant_growth(dynamics, guess, start_time, np.array([duration / steps]), np.array([steps]))
     if tried is None:
         return 0, 0.0
+    angle = steps * float(tried[1][0])
     # The number of steps is at least h omega over that of the slowest growth that is looked at.
-    counts = np.geomspace(1.0, max(tried[1][0] / SLOWEST, 2.0), COUNTED)
+    counts = np.geomspace(1.0, max(angle / SLOWEST, 2.0), COUNTED)
     last = 0.0
     for _ in range(2):
         counts = np.unique(np.ceil(counts))
@@ -259,7 +260,7 @@ def stable_from(
             break
         last, above = counts[unstable[-1]], counts[min(unstable[-1] + 1, len(counts) - 1)]
         counts = np.linspace(last, above, COUNTED)
-    return int(last) + 1, float(tried[1][0])
+    return int(last) + 1, angle
 
 
 def _constant_growth(
