@@ -60,8 +60,8 @@ class Climb:
     sharp = False
     # How near attempts from nearly the answer stay to it.
     staying = STAYING
-    # Meshes are refined until there was so much work.
-    most_work = np.inf
+    # Meshes are refined until there was so much work, each in at most so many iterations.
+    most_work, most_finer = np.inf, None
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 
@@ -249,7 +249,7 @@ class Climb:
             onto = attempt.path.finer(attempt.to_cut(tol or accurate) if self.sharp else attempt.errors)
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS or self.work > self.most_work:
                 break
-            found = self.on_finer(onto)
+            found = self.on_finer(onto, self.most_finer)
             if found.answer.status == "stopped":
                 return found, error, False
             if not found.solved:

@@ -142,6 +142,7 @@ def _by_arcs(
     for these, dearer in ((arcs, np.inf), (moving, SAME_COST))[: 1 if moving == arcs else 2]:
         climb = Climb(mission_of(problem, these), *numerics)
         climb.sharp, climb.staying = True, NEARER if most > MOST_ITERATIONS else STAYING
+        climb.most_finer = MOST_ITERATIONS
         climb.levels.extend(coarse.ladder)
         with climb.interrupt:
             found = _improved(climb, problem, these, (coarse,), tol, most)
@@ -201,6 +202,9 @@ def _improved(
             arcs = known if attempt is first else improved(problem, known, found)
             if alike(arcs, known):
                 last, error, met = climb.refined(attempt, tol, ACCURATE, STILL, seen)
+                if attempt is not first and climb.levels[-1].status == "iteration limit":
+                    # Along limits controls of high order may hardly be determined: those of low order are.
+                    last, error, met = climb.refined(first, tol, ACCURATE, STILL, seen)
                 found = answered(climb, last, error, met, tol)
                 arcs = improved(problem, known, found) if found.optimal and last is not attempt else arcs
         legs = found.legs
