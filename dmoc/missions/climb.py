@@ -61,7 +61,8 @@ class Climb:
     # How near attempts from nearly the answer stay to it.
     staying = STAYING
     # Meshes are refined until there was so much work, each in at most so many iterations.
-    most_work, most_finer = np.inf, None
+    most_work = np.inf
+    most_finer: int | None = None
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 

@@ -20,7 +20,15 @@ from dmoc.results.switches import linear_controls
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
-from dmoc.structure.modes import are_rows, continued, controls_at_limits, is_linear, names_of, sides_of
+from dmoc.structure.modes import (
+    REVERSED,
+    are_rows,
+    continued,
+    controls_at_limits,
+    is_linear,
+    names_of,
+    sides_of,
+)
 from dmoc.structure.speeds import held, is_of_speed
 from dmoc.structure.surfaces import Followed, Tangent
 
@@ -75,7 +83,7 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
         constraints = tuple(parts)
     if arc.kind == COAST:
         return Coast(constraints=constraints, name=name)
-    if arc.kind == BURN:
+    if arc.kind.startswith(BURN):
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
     # Where a speed is kept to along a line, that says what the control is; in a plane it may turn, and where no
@@ -153,7 +161,7 @@ class Course:
             return np.zeros((len(at), 0))
         control = np.stack([np.interp(at, self.times, column) for column in self.control.T], axis=1)
         primer = np.stack([np.interp(at, self.times, column) for column in self.costate.T], axis=1)
-        if kind != BURN:
+        if not kind.startswith(BURN):
             return controls_at_limits(problem, kind, control, primer)
         upper = problem.actuator.bounds(problem.dimension)[1]
         if problem.actuator.smoothing is None:
@@ -161,6 +169,19 @@ class Course:
         # A thrust of least cost is against the costate, also where the coarse answer coasts.
         primer = -primer / np.maximum(np.linalg.norm(primer, axis=1), 1e-300)[:, None]
         return np.hstack([upper[-1] * primer, np.full((len(at), 1), upper[-1])])
+
+
+def with_one_way(path: DiscretePath, axes: int) -> DiscretePath:
+    """The path of an arc with forces turned round where they are against a neighbour: they turn at its ends.
+
+    Where the costate is nearly none a node whose force is against the others is an optimum of its own.
+    """
+    control = path.control.copy()
+    force = control[:, :axes]
+    signs = np.where((force[1:] * force[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    signs = np.cumprod(np.append(1.0, signs))
+    force *= (signs * signs[len(signs) // 2])[:, None]
+    return replace(path, control=control)
 
 
 def path_of(
@@ -175,6 +196,8 @@ def path_of(
         course.leg(problem, arc.kind, (begin, end), order)
         for arc, begin, end in zip(arcs, begins, ends, strict=True)
     ]
+    if any(REVERSED in arc.kind for arc in arcs):
+        paths = [with_one_way(path, problem.dimension) for path in paths]
     return MissionPath(tuple(paths), tuple(map(float, begins)))
 
 
