@@ -42,6 +42,9 @@ LEAST_STEPS = 2
 SINGULAR_DEGREE = 6
 # A leg of a guess lasts at least this part of the whole duration [-].
 LEAST_GUESSED = 2e-3
+# Forces of neighbouring nodes of an arc have at least this cosine in a guess, where it is turned round at an
+# end [-].
+ALIKE = 0.5
 # The angle around attractors is summed up over this many places of a leg.
 SAMPLES = 200
 
@@ -172,15 +175,18 @@ class Course:
 
 
 def with_one_way(path: DiscretePath, axes: int) -> DiscretePath:
-    """The path of an arc with forces turned round where they are against a neighbour: they turn at its ends.
+    """The path of an arc whose force hardly turns from node to node: where it does, that is as it was before.
 
-    Where the costate is nearly none a node whose force is against the others is an optimum of its own.
+    An arc ends where its force is turned round. There the costate is nearly none, and a node whose force is
+    against the others is an optimum of its own.
     """
-    control = path.control.copy()
+    control, middle = path.control.copy(), len(path.control) // 2
     force = control[:, :axes]
-    signs = np.where((force[1:] * force[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    signs = np.cumprod(np.append(1.0, signs))
-    force *= (signs * signs[len(signs) // 2])[:, None]
+    for nodes, back in ((range(middle + 1, len(force)), 1), (range(middle - 1, -1, -1), -1)):
+        for node in nodes:
+            before = force[node - back]
+            if force[node] @ before < ALIKE * np.linalg.norm(force[node]) * np.linalg.norm(before):
+                force[node] = before
     return replace(path, control=control)
 
 

@@ -19,7 +19,8 @@ from dmoc.scene.problem import TransferProblem
 FREE = "arc"
 # An arc of the largest force. Behind a joint where that is turned round its kind has the other word, too.
 FULL, REVERSED = "full force", "reversed"
-# The largest force is turned round between two nodes if their directions have at most this cosine [-].
+# The largest force is turned round within two gaps between nodes if its directions there have at most this
+# cosine [-].
 OPPOSED = -0.9
 # Words for the limits that are kept to in one arc are joined by this one.
 AND = " and "
@@ -233,11 +234,15 @@ def turned_round(
         return cuts
     nodes = np.flatnonzero(np.linalg.norm(force, axis=1) > 0.5 * limit)
     ways = force[nodes] / np.linalg.norm(force[nodes], axis=1)[:, None]
-    turns = np.flatnonzero((ways[1:] * ways[:-1]).sum(axis=1) < OPPOSED)
-    middles = [float(0.5 * (at[nodes[i]] + at[nodes[i + 1]])) for i in turns]
+    middles: list[float] = []
+    for apart in (1, 2):
+        for i in np.flatnonzero((ways[apart:] * ways[:-apart]).sum(axis=1) < OPPOSED):
+            first, last = at[nodes[i]], at[nodes[i + apart]]
+            if not any(first < middle < last for middle in middles):
+                middles.append(float(0.5 * (first + last)))
     found, begin, back = [], 0.0, False
     for kind, end in cuts:
-        for last in [*(middle for middle in middles if begin < middle < end), end]:
+        for last in [*(middle for middle in sorted(middles) if begin < middle < end), end]:
             found.append((kind + AND + REVERSED if back and kind in full else kind, last))
             back ^= last != end
         begin = end
