@@ -60,8 +60,8 @@ class Climb:
     sharp = False
     # How near attempts from nearly the answer stay to it.
     staying = STAYING
-    # Meshes are refined until there was so much work, each in at most so many iterations.
-    most_work = np.inf
+    # So many meshes are refined to a tolerance, until so much work, and each in at most so many iterations.
+    most_meshes, most_work = MOST_MESHES, np.inf
     most_finer: int | None = None
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
@@ -242,7 +242,7 @@ class Climb:
         """
         error: Error | None = None
         changes: list[float] = []
-        for _ in range(MOST_MENDED if tol is None and np.isinf(still) else MOST_MESHES):
+        for _ in range(MOST_MENDED if tol is None and np.isinf(still) else self.most_meshes):
             rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
