@@ -66,7 +66,8 @@ class TeamClimb(Climb):
         path: Any = attempt.path
         if not path.touches:
             return error
-        return replace(error, objective=max(changes[-1], *[0.25 * change for change in changes[-2:-1]], 0.0))
+        seen = changes[-1], *[0.25 * change for change in changes[-2:-1]]
+        return replace(error, objective=max(error.objective, *seen))
 
     def cut_at_leaps(self, path: Any) -> Any:
         """A path on steps cut in two in which bodies come too near between nodes; None if there are none."""
