@@ -42,8 +42,7 @@ LEAST_STEPS = 2
 SINGULAR_DEGREE = 6
 # A leg of a guess lasts at least this part of the whole duration [-].
 LEAST_GUESSED = 2e-3
-# Forces of neighbouring nodes of an arc have at least this cosine in a guess, where it is turned round at an
-# end [-].
+# Forces at neighbouring nodes of an arc that is turned round have at least this cosine in a guess [-].
 ALIKE = 0.5
 # The angle around attractors is summed up over this many places of a leg.
 SAMPLES = 200

@@ -242,10 +242,11 @@ def turned_round(
                 middles.append(float(0.5 * (first + last)))
     found, begin, back = [], 0.0, False
     for kind, end in cuts:
-        for last in [*(middle for middle in sorted(middles) if begin < middle < end), end]:
+        inside = [middle for middle in sorted(middles) if begin < middle < end and kind in full]
+        for last in [*inside, end]:
             found.append((kind + AND + REVERSED if back and kind in full else kind, last))
             back ^= last != end
-        begin = end
+        begin, back = end, back and kind in full
     return found
 
 
