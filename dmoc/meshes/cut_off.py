@@ -100,7 +100,7 @@ def cut_off(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, st
     scales = path_scales(path, least_extent(problem.mass, problem.inertia))
     sizes = {"m": scales.extent, "rad": scales.turn, "degrees": np.degrees(scales.turn)}
     for i, constraint in enumerate(problem.constraints):
-        beyond = _deepest(_beyond(constraint, dynamics, samples)[:, None], gaps)[:, 0]
+        beyond = deepest(_beyond(constraint, dynamics, samples)[:, None], gaps)[:, 0]
         beyond = beyond.reshape(steps, -1).max(axis=1)
         depth = np.maximum(depth, beyond / sizes.get(constraint.unit, np.inf))
         for worth, broken in _rows(problem, i, dynamics, path, samples):
@@ -109,11 +109,19 @@ def cut_off(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, st
                 over = np.maximum(broken[:-1], 0.0).reshape(steps, -1, worth.shape[1]).mean(axis=1)
                 cost, shares = cost + float((worth * over).sum()), shares + (worth * over).sum(axis=1)
                 continue
-            deep = _deepest(broken, gaps)
-            beside = np.maximum(np.pad(deep, ((1, 0), (0, 0))), np.pad(deep, ((0, 1), (0, 0))))
-            cost += float((worth * beside).sum())
-            shares = shares + ((worth[1:] + worth[:-1]) * deep).sum(axis=1).reshape(steps, -1).sum(axis=1)
+            paid, mine = paid_at_nodes(worth, deepest(broken, gaps), steps)
+            cost, shares = cost + paid, shares + mine
     return CutOff(cost, shares, depth)
+
+
+def paid_at_nodes(worth: np.ndarray, deep: np.ndarray, steps: int) -> tuple[float, np.ndarray]:
+    """What it costs to keep rows beside their nodes, too, and what each step adds to that.
+
+    By what each row is worth at each node, and how much it is broken in each gap between two nodes.
+    """
+    beside = np.maximum(np.pad(deep, ((1, 0), (0, 0))), np.pad(deep, ((0, 1), (0, 0))))
+    shares = ((worth[1:] + worth[:-1]) * deep).sum(axis=1).reshape(steps, -1).sum(axis=1)
+    return float((worth * beside).sum()), shares
 
 
 def _sampled(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, start_time: float) -> _Samples:
@@ -159,12 +167,12 @@ def _rows(
             continue
         given = samples.time, samples.position.T, samples.slope.T, samples.mass
         worth = weights * np.abs(density) if kind == "node" else _over_steps(path, np.abs(density), len(low))
-        yield worth, _outside(columns(function, *given)[0].T, low, high)
+        yield worth, outside(columns(function, *given)[0].T, low, high)
     for at, low, high in _walls(constraint, path):
         worth = weights * np.abs(path.multipliers[POSITION_BOUNDS])[:, at]
         # At the ends, bounds hold fixed positions.
         worth[[0, -1]] = 0.0
-        yield worth, _outside(samples.position[:, at], low, high)
+        yield worth, outside(samples.position[:, at], low, high)
 
 
 def _functions(
@@ -201,12 +209,12 @@ def _walls(constraint: Constraint, path: DiscretePath) -> Iterator[tuple[np.ndar
         yield at, low, high
 
 
-def _outside(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def outside(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """By how much values are outside of bounds, negative inside."""
     return np.maximum(low - values, values - high)
 
 
-def _deepest(broken: np.ndarray, gaps: int) -> np.ndarray:
+def deepest(broken: np.ndarray, gaps: int) -> np.ndarray:
     """The most that each gap breaks, at least 0, by parabolas through three samples each; shape (gaps, rows).
 
     A path that touches a zone at a node may be inside it for less than the distance of two samples.
@@ -215,6 +223,7 @@ def _deepest(broken: np.ndarray, gaps: int) -> np.ndarray:
     each = np.concatenate([inner, np.append(inner[1:, 0], broken[-1:], axis=0)[:, None]], axis=1)
     before, here, after = each[:, :-2], each[:, 1:-1], each[:, 2:]
     bend, slope = 0.5 * (before + after) - here, 0.5 * (after - before)
-    at = np.clip(-slope / np.minimum(2 * bend, -np.finfo(float).tiny), -1.0, 1.0)
+    # The top of a parabola, or the sample towards it if it lies beyond.
+    at = slope / np.maximum(np.maximum(2 * np.abs(bend), np.abs(slope)), np.finfo(float).tiny)
     peak = np.where(bend < 0, here + slope * at + bend * at**2, 0.0)
     return np.maximum(np.maximum(each.max(axis=1), peak.max(axis=1)), 0.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dmoc import (
+    Apart,
     Attitude,
     BallTorque,
     Effort,
@@ -14,6 +15,7 @@ from dmoc import (
     PointingKeepOut,
     SpeedLimit,
     State,
+    Team,
     TransferProblem,
     Via,
     rotation,
@@ -92,3 +94,14 @@ def test_of_a_mission_it_counts_in_all_legs():
     mission = Mission(problem.mass, problem.start, problem.goal, legs, constraints=ZONES)
     found, fine = (solve(mission, tol=tol, structure=False).raise_for_status() for tol in (1e-4, 1e-6))
     assert abs(found.objective / fine.objective - 1) <= found.error.objective
+
+
+def test_of_a_team_the_distances_count_that_bodies_keep():
+    """One body along x and one across its way: two meshes share the node at which they touch."""
+    members = [
+        TransferProblem(1.7326, rest(0, 0, 0), rest(6, 0, 0), 8.0),
+        TransferProblem(1.0, rest(2.8699, -2.6023, 0), rest(3.9484, 3.3442, 0), 8.0),
+    ]
+    team = Team(members, together=[Apart(1.3494)])
+    found, fine = (solve(team, tol=tol, structure=False).raise_for_status() for tol in (1e-3, 1e-6))
+    assert 1e-5 < abs(found.objective / fine.objective - 1) <= found.error.objective
