@@ -43,8 +43,6 @@ SLOWEST = 0.02
 COUNTED = 300
 # A step whose h omega is below this is stable by far at any order: nothing is computed before the solve.
 HARMLESS = 0.5
-
-
 # What finds a mesh that is fine enough for the checks, too.
 OPEN = "--tol 1e-4 (in Python tol=1e-4) finds as many as the accuracy needs"
 # A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its
@@ -247,10 +245,9 @@ def stable_from(
     tried = _constant_growth(dynamics, guess, start_time, np.array([duration / steps]), np.array([steps]))
     if tried is None:
         return 0, 0.0
-    angle = steps * float(tried[1][0])
     # The number of steps is at least h omega over that of the slowest growth that is looked at.
+    last, angle = 0.0, steps * float(tried[1][0])
     counts = np.geomspace(1.0, max(angle / SLOWEST, 2.0), COUNTED)
-    last = 0.0
     for _ in range(2):
         counts = np.unique(np.ceil(counts))
         found = _constant_growth(dynamics, guess, start_time, duration / counts, counts)
