@@ -32,7 +32,9 @@ def holds(ladder: Ladder, remedy: Remedy, solved: Callable[[Ladder], Solution]) 
         return False
     problem, path = remedy.problem, remedy.path
     try:
-        if path is not None and problem.actuator.smoothing is None:
+        # A body that turns or has links may be led elsewhere by the usual guess.
+        bare = not (problem.turns or problem.links) and problem.inertia is None
+        if path is not None and bare and problem.actuator.smoothing is None:
             near = _trial(ladder, problem)
             solution = _told(ladder, near.solution(near.try_on(path, most=MOST_NEAR)))
             if not solution.success or verify(solution).ok:
