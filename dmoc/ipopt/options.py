@@ -151,8 +151,8 @@ def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> 
         settings["ipopt.mumps_scaling"] = 8
         if problem.free_duration and problem.actuator == problem.actuator.throughout:
             # A free duration stands in every row of motion: pivots that are small beside it are delayed, and
-            # three iterations on 700 steps took 49 s, like this 2 s. At 1e-13 steps are so wrong that Ipopt sees
-            # negative curvature.
+            # three iterations on 700 steps took 49 s, like this 2 s. From 1e-13 on steps are so wrong that
+            # Ipopt sees negative curvature.
             settings |= {"ipopt.mumps_pivtol": 1e-9, "ipopt.mumps_pivtolmax": 1e-8}
             # The guess is the answer but for the mesh, and so are the multipliers that follow from it, however
             # large: Ipopt would begin with none, and far off.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,6 +30,8 @@ class Wave:
 
     parts: np.ndarray
     ahead: float = 0.0
+    # Whether they count for the place of arrival that is looked for, and not only for where the goal is.
+    pulls: bool = True
 
     @classmethod
     def through(cls, angles: np.ndarray, values: np.ndarray, ahead: float) -> Wave:
@@ -54,7 +56,7 @@ class Wave:
 
     def moved(self, more: np.ndarray, ahead: float) -> Wave:
         """With values that are more by this, and the angle farther ahead."""
-        return Wave(np.vstack([self.parts[0] + more, self.parts[1:]]), self.ahead + ahead)
+        return replace(self, parts=np.vstack([self.parts[0] + more, self.parts[1:]]), ahead=self.ahead + ahead)
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class Averaged:
 
     @cached_property
     def numbers(self) -> tuple[float, float, float]:
-        """Mass [kg], what of it burns a unit of time [kg], and the largest force as the mass that it moves [kg]."""
+        """Mass [kg], what of it burns a unit of time [kg], the largest force as the mass that it moves [kg]."""
         problem, actuator, unit = self.problem, self.problem.actuator, self.elements
         flow = float(actuator.flow(full_controls(problem))) if actuator.burns else 0.0
         return problem.mass, flow * unit.time, (actuator.force_limit() or 0.0) * unit.time / unit.speed
@@ -96,7 +98,9 @@ class Averaged:
         q, v, axes = unit.state(slow, angle)
         offset = q - ca.DM(unit.center)
         pull = Dynamics.of(self.problem).acceleration(time, q, v, mass, ca.DM.zeros(unit.axes))
-        disturbed = axes.T @ (pull + unit.mu * offset / ca.sqrt(ca.sumsqr(offset)) ** 3) * unit.time / unit.speed
+        disturbed = (
+            axes.T @ (pull + unit.mu * offset / ca.sqrt(ca.sumsqr(offset)) ** 3) * unit.time / unit.speed
+        )
         effect = unit.effect(slow, angle)
         return effect @ disturbed, effect, axes
 
@@ -132,8 +136,10 @@ class Averaged:
         """The rates of elements, costates and duration over the fraction of the duration."""
         return remembered(self._rates, "averaged", self)[0](fraction, unknowns).full().ravel()
 
-    def march(self, costate: np.ndarray, duration: float, sensitive: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Elements and costates after each step, and the slopes of the last over first costates and duration."""
+    def march(
+        self, costate: np.ndarray, duration: float, sensitive: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Elements and costates after each step, and slopes of the last over first costates and duration."""
         _, slopes = remembered(self._rates, "averaged", self)
         x = np.concatenate([self.first, costate, [duration]])
         size = len(x)
@@ -165,21 +171,30 @@ class Averaged:
         miss = ca.vertcat(*(row.expression - row.upper for row in rows if row.lower == row.upper))
         multipliers = ca.SX.sym("multipliers", miss.numel())
         bent = ca.hessian(ca.dot(multipliers, miss), slow)[0]
-        return ca.Function("goal", [slow, time, multipliers], list(map(ca.densify, (miss, ca.jacobian(miss, slow), bent))))
+        return ca.Function(
+            "goal", [slow, time, multipliers], list(map(ca.densify, (miss, ca.jacobian(miss, slow), bent)))
+        )
 
-    def goal(self, slow: np.ndarray, duration: float, multipliers: np.ndarray | None = None) -> list[np.ndarray]:
+    def goal(
+        self, slow: np.ndarray, duration: float, multipliers: np.ndarray | None = None
+    ) -> list[np.ndarray]:
         """Equations of the goal for elements, their slopes, and the Hessian of their weighted sum."""
         rows = remembered(self._goal, "averaged goal", self)
         given = np.zeros(rows.size1_in(2)) if multipliers is None else multipliers
-        miss, slopes, bent = (part.full() for part in rows(slow, self.problem.start_time + duration * self.elements.time, given))
+        miss, slopes, bent = (
+            part.full() for part in rows(slow, self.problem.start_time + duration * self.elements.time, given)
+        )
         return [miss.ravel(), slopes, bent]
 
-    def shot(self, z: np.ndarray, wave: Wave, sensitive: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """How far unknowns z are from the equations of the least time, and the slopes of that and of the end.
+    def shot(
+        self, z: np.ndarray, wave: Wave, sensitive: bool = True
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """How far unknowns z are from the equations of least time, and the slopes of that and of the end.
 
         z are first costates, the duration and the multipliers of the goal. At the end elements with their
         `wave` meet the goal, and costates are the multipliers' sum of its slopes; that of the angle, which
-        does not change, is what the wave makes of it. Only the direction of costates counts: their size is 1.
+        does not change, is what the wave makes of it, if it pulls. Only the direction of costates counts:
+        their size is 1.
         """
         size = self.elements.slow
         duration, multipliers = z[size + 1], z[size + 2 :]
@@ -187,7 +202,8 @@ class Averaged:
         end, costate = path[-1], path[-1][size + 1 : 2 * size + 1]
         value, slope, bend = wave.at(end[size])
         miss, slopes, bent = self.goal(end[:size] + value, duration, multipliers)
-        size_off, angle_off = z[:size] @ z[:size] - 1, z[size] - costate @ slope
+        pull, bend = (wave.pulls * part for part in (slope, bend))
+        size_off, angle_off = z[:size] @ z[:size] - 1, z[size] - costate @ pull
         off = np.concatenate([miss, costate - slopes.T @ multipliers, [size_off, angle_off]])
         rows, jacobian = len(miss), np.zeros((len(off), len(z)))
         ends = np.hstack([flow, np.zeros((len(flow), rows))])
@@ -196,7 +212,7 @@ class Averaged:
         jacobian[rows : rows + size] = ends[size + 1 : 2 * size + 1] - bent @ moved
         jacobian[rows : rows + size, size + 2 :] -= slopes.T
         jacobian[-2, :size] = 2 * z[:size]
-        jacobian[-1] = -slope @ ends[size + 1 : 2 * size + 1] - (costate @ bend) * ends[size]
+        jacobian[-1] = -pull @ ends[size + 1 : 2 * size + 1] - (costate @ bend) * ends[size]
         jacobian[-1, size] += 1
         return off, jacobian, ends
 

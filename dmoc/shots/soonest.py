@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import casadi as ca
@@ -18,7 +18,9 @@ from dmoc.shots.averaged import PLACES, STEPS, Averaged, Wave
 # A search ends after so many corrections, where no part of one down to this gets nearer [-], or where the
 # equations hold to this [-], far better than the mean tells of the motion. One changes the duration by at most
 # this part of it [-].
-MOST_CORRECTIONS, SHORTEST, MET, LONGER = 40, 1e-4, 1e-9, 0.3
+MOST_CORRECTIONS, SHORTEST, MET, LONGER = 25, 1e-2, 1e-9, 0.3
+# The place of arrival with the shortest duration is found after so few of them, or left as it is.
+FEW_CORRECTIONS = 6
 # Costates along the way are a polynomial of this degree.
 DEGREE = 8
 # A flight follows the motion to this relative error [-], in at most so many steps.
@@ -28,6 +30,8 @@ SEEN = 65
 # The place of arrival is looked for over so many radians before and after that of the mean motion, at so many
 # places.
 REACH, TRIED = 3 * np.pi, 361
+# At most so many places are tried.
+MOST_PLACES = 5
 # A flight meets the goal if its elements are so near [-] and its angle so near [rad]; those that do take one to
 # three.
 NEAR, NEAR_ANGLE, MOST_FLIGHTS = 1e-6, 1e-3, 4
@@ -94,30 +98,43 @@ def _aimed(averaged: Averaged) -> tuple[Aim | None]:
     hundredth of the duration.
     """
     first = _first_aim(averaged)
-    aim = None if first is None else _corrected(averaged, first, Wave.constant(np.zeros(averaged.elements.slow)))
+    aim = (
+        None if first is None else _corrected(averaged, first, Wave.constant(np.zeros(averaged.elements.slow)))
+    )
     if aim is None:
         return (None,)
     try:
-        wave, still = _best_place(aim)
-        begin = _corrected(averaged, aim.unknowns, still) or aim
-        for _ in range(MOST_FLIGHTS):
-            found = _corrected(averaged, begin.unknowns, wave)
-            if found is None:
-                return (begin,)
-            begin, end, size = found, found.path[-1], averaged.elements.slow
-            last = begin.flight(np.array([0.0, 1.0]))[:, -1]
-            more, late = last[:size] - end[:size] - wave.at(end[size])[0], last[size] - end[size] - wave.ahead
-            wave = wave.moved(more, late)
-            if np.abs(more).max() < NEAR and abs(late) < NEAR_ANGLE:
-                break
+        wave = _waves(aim)
+        mean = Wave.constant(wave.parts[0].real)
+        middle = _corrected(averaged, aim.unknowns, mean) or aim
+        for place in _best_places(middle, wave):
+            still = _corrected(averaged, middle.unknowns, Wave.constant(wave.at(place)[0]))
+            found = None if still is None else _on_waves(still, replace(wave, pulls=False))
+            if found is not None:
+                return (_on_waves(found, wave, FEW_CORRECTIONS) or found,)
     except RuntimeError:
         # The body falls into the attractor.
         return (None,)
-    return (begin,)
+    return (middle,)
+
+
+def _on_waves(begin: Aim, wave: Wave, most: int = MOST_CORRECTIONS) -> Aim | None:
+    """The aim whose flight meets the goal where elements sway, from one that is near; None if there is none."""
+    averaged, size, found = begin.averaged, begin.averaged.elements.slow, None
+    for _ in range(MOST_FLIGHTS):
+        aim = _corrected(averaged, (found or begin).unknowns, wave, most)
+        if aim is None:
+            break
+        found, end, last = aim, aim.path[-1], aim.flight(np.array([0.0, 1.0]))[:, -1]
+        more, late = last[:size] - end[:size] - wave.at(end[size])[0], last[size] - end[size] - wave.ahead
+        wave = wave.moved(more, late)
+        if np.abs(more).max() < NEAR and abs(late) < NEAR_ANGLE:
+            break
+    return found
 
 
 def _first_aim(averaged: Averaged) -> np.ndarray | None:
-    """Unknowns of a small change from the start to the nearest state of the goal, whatever else it leaves open."""
+    """Unknowns of a small change from the start to the nearest state of the goal, whatever that leaves open."""
     problem, unit, size = averaged.problem, averaged.elements, averaged.elements.slow
     goal = unit.found(problem.goal.estimate(problem.start_time, averaged.state))[:size]
     change, middle = goal - averaged.first[:size], 0.5 * (goal + averaged.first[:size])
@@ -136,10 +153,12 @@ def _first_aim(averaged: Averaged) -> np.ndarray | None:
     return np.concatenate([costate, [0.0, duration], np.linalg.lstsq(slopes.T, costate, rcond=None)[0]])
 
 
-def _corrected(averaged: Averaged, unknowns: np.ndarray, wave: Wave) -> Aim | None:
+def _corrected(
+    averaged: Averaged, unknowns: np.ndarray, wave: Wave, most: int = MOST_CORRECTIONS
+) -> Aim | None:
     """The aim that meets the equations with a wave, by Newton's method from near it; None if none is found."""
     z, place = unknowns, averaged.elements.slow + 1
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(most):
         off, jacobian, _ = averaged.shot(z, wave)
         size = np.linalg.norm(off)
         if size < MET:
@@ -156,32 +175,38 @@ def _corrected(averaged: Averaged, unknowns: np.ndarray, wave: Wave) -> Aim | No
     return None
 
 
-def _best_place(aim: Aim) -> tuple[Wave, Wave]:
-    """The waves of the elements about the end, and their values at the best place of arrival.
+def _waves(aim: Aim) -> Wave:
+    """By how much the elements of a flight are more than their mean, over a revolution around the end."""
+    averaged, size, end = aim.averaged, aim.averaged.elements.slow, aim.path[-1]
+    turn = 2 * np.pi / float(averaged.elements.motion(end[:size])) / aim.duration
+    seen = np.linspace(1 - 0.5 * turn, 1 + 0.5 * turn, SEEN)
+    flown = aim.flight(np.append(0.0, seen))[:, 1:].T
+    drift = np.outer(seen - 1, averaged.rate(1.0, end)[:size])
+    return Wave.through(
+        flown[:, size], flown[:, :size] - end[:size] - drift, flown[SEEN // 2, size] - end[size]
+    )
+
+
+def _best_places(aim: Aim, wave: Wave) -> np.ndarray:
+    """Mean angles of arrival from where the duration grows both ways, the shortest first.
 
     To first order, a shift of the goal by what the waves are at a place changes the duration and the place
     where the mean motion arrives; to arrive elsewhere takes a costate of the angle, and grows with the square.
     """
-    averaged, unit = aim.averaged, aim.averaged.elements
-    size, end = unit.slow, aim.path[-1]
-    turn = 2 * np.pi / float(unit.motion(end[:size])) / aim.duration
-    seen = np.linspace(1 - 0.5 * turn, 1 + 0.5 * turn, SEEN)
-    flown = aim.flight(np.append(0.0, seen))[:, 1:].T
-    drift = np.outer(seen - 1, averaged.rate(1.0, end)[:size])
-    ahead = flown[SEEN // 2, size] - end[size]
-    wave = Wave.through(flown[:, size], flown[:, :size] - end[:size] - drift, ahead)
-    _, jacobian, ends = averaged.shot(aim.unknowns, Wave.constant(np.zeros(size)))
-    slopes = averaged.goal(end[:size], aim.duration)[1]
+    averaged, size, end = aim.averaged, aim.averaged.elements.slow, aim.path[-1]
+    mean = wave.parts[0].real
+    _, jacobian, ends = averaged.shot(aim.unknowns, Wave.constant(mean))
+    slopes = averaged.goal(end[:size] + mean, aim.duration)[1]
     shifted = -np.linalg.lstsq(jacobian, np.eye(len(jacobian))[:, : len(slopes)] @ slopes, rcond=1e-12)[0]
     away = np.linspace(-REACH, REACH, TRIED)
-    values = np.stack([wave.at(end[size] + angle)[0] for angle in away])
+    values = np.stack([wave.at(end[size] + angle)[0] - mean for angle in away])
     later, natural = values @ shifted[size + 1], values @ (ends[size] @ shifted)
     jacobian[-1] = ends[size]
     costate = np.linalg.lstsq(jacobian, np.eye(len(jacobian))[-1], rcond=1e-13)[0][size]
     gain = end[size + 1 : 2 * size + 1] @ averaged.rate(1.0, end)[:size] / aim.duration
-    dear = np.clip(abs(costate / gain), LEAST_COST, MOST_COST)
-    best = int(np.argmin(later + 0.5 * dear * (away - natural) ** 2))
-    return wave, Wave.constant(values[best])
+    total = later + 0.5 * np.clip(abs(costate / gain), LEAST_COST, MOST_COST) * (away - natural) ** 2
+    inside = np.flatnonzero((total[1:-1] <= total[:-2]) & (total[1:-1] < total[2:])) + 1
+    return end[size] + away[inside[np.argsort(total[inside])]][:MOST_PLACES]
 
 
 def _motion(averaged: Averaged) -> tuple[dict, ca.Function]:
