@@ -132,15 +132,20 @@ class Averaged:
 
         return summed(rates), summed(rates, ca.jacobian(rates, both))
 
+    @cached_property
+    def _held(self) -> tuple[ca.Function, ca.Function, ca.Function]:
+        """Rates, rates with their slopes, and the goal: to look them up takes longer than a call."""
+        return remembered(lambda: (*self._rates(), self._goal()), "averaged", self)
+
     def rate(self, fraction: float, unknowns: np.ndarray) -> np.ndarray:
         """The rates of elements, costates and duration over the fraction of the duration."""
-        return remembered(self._rates, "averaged", self)[0](fraction, unknowns).full().ravel()
+        return self._held[0](fraction, unknowns).full().ravel()
 
     def march(
         self, costate: np.ndarray, duration: float, sensitive: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Elements and costates after each step, and slopes of the last over first costates and duration."""
-        _, slopes = remembered(self._rates, "averaged", self)
+        _, slopes, _ = self._held
         x = np.concatenate([self.first, costate, [duration]])
         size = len(x)
         flow, path, h = np.eye(size)[:, len(self.first) :], [x], 1 / STEPS
@@ -179,7 +184,7 @@ class Averaged:
         self, slow: np.ndarray, duration: float, multipliers: np.ndarray | None = None
     ) -> list[np.ndarray]:
         """Equations of the goal for elements, their slopes, and the Hessian of their weighted sum."""
-        rows = remembered(self._goal, "averaged goal", self)
+        rows = self._held[2]
         given = np.zeros(rows.size1_in(2)) if multipliers is None else multipliers
         miss, slopes, bent = (
             part.full() for part in rows(slow, self.problem.start_time + duration * self.elements.time, given)
