@@ -126,6 +126,11 @@ class MissionPath:
         """The largest angle that a body is turned by in a leg [rad]."""
         return max(leg.turn for leg in self.legs)
 
+    @property
+    def meshes(self) -> list[tuple[np.ndarray, int]]:
+        """The mesh and the order of each leg."""
+        return [(leg.mesh, leg.order) for leg in self.legs]
+
     def onto(self, meshes: Sequence[tuple[np.ndarray, int]]) -> MissionPath:
         """The same on other meshes and orders, one pair a leg."""
         legs = [leg.onto(mesh, order, leg.hold) for leg, (mesh, order) in zip(self.legs, meshes, strict=True)]

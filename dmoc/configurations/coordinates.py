@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -43,6 +43,7 @@ class Coordinates:
     blocks: tuple[Block, ...]
 
     @classmethod
+    @cache
     def of_point(cls, axes: int) -> Coordinates:
         """Those of a point mass in a space of so many axes."""
         return cls((Block(PLACE, axes),))

@@ -131,7 +131,8 @@ class Limits:
 
         def told(slack: float) -> str:
             needed = dry - slack * load
-            return f"a dry mass of {down(needed)} kg (you gave {dry:g} kg)" if needed > 0 else ""
+            given = f"you gave {dry:g} kg, which leaves too little propellant"
+            return f"a dry mass of {down(needed)} kg ({given})" if needed > 0 else ""
 
         def change(problem: TransferProblem, slack: float) -> TransferProblem:
             burner: Any = problem.actuator

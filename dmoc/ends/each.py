@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -148,7 +148,10 @@ class Each(Boundary):
     def _made(self) -> Coordinates:
         """Of what parts the coordinates of all bodies are made."""
         pairs = zip(self.names, self.states, strict=True)
-        kinds = {True: Coordinates.of_rigid_body, False: Coordinates.of_point}
+        kinds: dict[bool, Callable[..., Coordinates]] = {
+            True: Coordinates.of_rigid_body,
+            False: Coordinates.of_point,
+        }
         return Coordinates.side_by_side({name: kinds[one.turns_body](one.dimension) for name, one in pairs})
 
     def _stacked(self, parts: Sequence[np.ndarray], kind: int) -> np.ndarray:

@@ -108,10 +108,9 @@ def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) 
         or guess.hold
         or problem.constraints
         or problem.objective.learns
+        or angle_around(problem, guess) < 2 * np.pi * VERY_MANY_TURNS
         or not _turns_with_it(problem)
     ):
-        return None
-    if angle_around(problem, guess) < 2 * np.pi * VERY_MANY_TURNS:
         return None
     offset = guess.position - lone.place(n)
     full = np.pad(offset, ((0, 0), (0, 3 - n)))

@@ -20,6 +20,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import path_scales
+from dmoc.parts.actuator import told_of
 from dmoc.scene.problem import TransferProblem
 
 # A coast is followed at this many places at least; between them it is interpolated linearly.
@@ -163,8 +164,7 @@ def with_mass(problem: TransferProblem, path: DiscretePath) -> DiscretePath:
     """The path with the mass that its controls leave, at least half of it."""
     if not problem.actuator.burns:
         return path
-    u = ca.SX.sym("u", problem.controls)
-    flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(path.control.T).full().ravel()
+    flow = told_of(problem.actuator, "flow", path.control)
     weights = node_weights(path.mesh, scheme(path.order))
     if path.hold:
         flow = np.interp(path.fractions, 0.5 * (path.mesh[1:] + path.mesh[:-1]), flow)

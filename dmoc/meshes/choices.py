@@ -247,7 +247,7 @@ def fastest_rates(problem: TransferProblem, path: DiscretePath) -> np.ndarray:
     """The rate of the fastest mode of the linearised motion at each node of a path of order 2 [1/s]."""
     slopes = np.gradient(path.position, path.duration * path.fractions, axis=0)
     dynamics = Dynamics.of(problem)
-    flow, _ = flow_matrices(dynamics, path, problem.start_time, rates_along(dynamics, path.position, slopes))
+    flow = flow_matrices(dynamics, path, problem.start_time, rates_along(dynamics, path.position, slopes))
     rates = np.linalg.eigvals(flow) if np.isfinite(flow).all() else np.full((1, 1), np.inf)
     # A mode that dies out need not be followed.
     return np.maximum(rates.real, np.abs(rates.imag)).max(axis=-1)

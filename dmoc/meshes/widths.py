@@ -10,7 +10,8 @@ from dmoc.scene.problem import TransferProblem
 # The rounding of |F| on the coarsest mesh is this part of the largest thrust [-].
 WIDEST_ROUNDING = 1e-2
 # Where propellant burns that no cost counts it is this part: to burn more is then a gain, and from a narrower
-# one Ipopt wanders at the node in which the thrust is reversed.
+# one Ipopt wanders at the node in which the thrust is reversed. Around an attractor the thrust turns instead:
+# over 19 transfers in least time the wide one took 1,793 iterations, the usual one 1,688.
 WIDEST_UNPAID = 0.3
 
 
@@ -20,7 +21,8 @@ def rounding_stages(
     """The meshes, each with the rounding of |F| at zero: wide on the coarse ones, as asked for on the last."""
     if (rounding := problem.actuator.smoothing) is None:
         return [(mesh, None) for mesh in meshes]
-    widest = WIDEST_UNPAID if burns_unpaid(problem) else WIDEST_ROUNDING
+    reversed_once = burns_unpaid(problem) and problem.attraction.lone is None
+    widest = WIDEST_UNPAID if reversed_once else WIDEST_ROUNDING
     count = max(int(np.ceil(np.log10(widest / rounding))), 0)
     widths = [widest * 0.1**i for i in range(count)] + [rounding]
     repeated = [meshes[0]] * (len(widths) - len(meshes)) + meshes

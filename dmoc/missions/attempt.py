@@ -10,12 +10,13 @@ import numpy as np
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.ipopt.run import Answer
+from dmoc.meshes.cut_off import CutOff, cut_off
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import path_scales
 from dmoc.nlp.units import outgrown
 from dmoc.results.estimate import local_errors
-from dmoc.results.facts import Level
+from dmoc.results.facts import Error, Level
 from dmoc.rungs.rung import rounded
 from dmoc.scene.problem import TransferProblem
 
@@ -65,10 +66,34 @@ class Attempt:
             path_scales(leg).share(*goal_miss(Dynamics.of(problem), leg, begin)) for problem, leg, begin in legs
         )
 
-    def to_cut(self, accurate: float) -> list[np.ndarray]:
-        """The errors by which steps are cut: all alike where what is left is in no step more than in others."""
-        few = self.largest_error <= accurate
-        return [np.ones_like(each) for each in self.errors] if few else self.errors
+    @cached_property
+    def passed(self) -> list[CutOff]:
+        """What each leg cuts off its limits between its nodes, of the objective."""
+        path, stretches = self.path, self.program.mission.stretches
+        return [
+            cut_off(problem, Dynamics.of(problem), leg, begin).of(cost_scale(self))
+            for problem, leg, begin in zip(stretches, path.legs, path.begins, strict=True)
+        ]
+
+    def counted(self, error: Error) -> Error:
+        """An error together with what all legs cut off."""
+        steps, depth = (
+            np.concatenate(part) for part in zip(*((p.steps, p.depth) for p in self.passed), strict=True)
+        )
+        return CutOff(sum(each.cost for each in self.passed), steps, depth).counted(error)
+
+    def to_cut(self, accurate: float, evenly: bool, counts: bool) -> list[np.ndarray]:
+        """The errors by which steps are cut; if it `counts`, what a step cuts off its limits is one, too.
+
+        If `evenly`, all are alike where what is left is in no step more than in others.
+        """
+        errors = self.errors
+        if evenly and self.largest_error <= accurate:
+            errors = [np.ones_like(each) for each in errors]
+        if not counts:
+            return errors
+        each = zip(errors, self.passed, strict=True)
+        return [np.maximum(known, passed.heavy(accurate)) for known, passed in each]
 
     def out_of_time(self) -> Attempt:
         """The attempt when the time is over: what did not get there has failed, nobody interrupted it."""
@@ -77,8 +102,12 @@ class Attempt:
 
 def change(coarse: Attempt, fine: Attempt) -> float:
     """What the objective changes from mesh to mesh, of itself [-]."""
-    scale = max(abs(fine.level.objective), 1e-12 * fine.program.cost)
-    return abs(fine.level.objective - coarse.level.objective) / scale
+    return abs(fine.level.objective - coarse.level.objective) / cost_scale(fine)
+
+
+def cost_scale(attempt: Attempt) -> float:
+    """The size of the objective, in its own unit."""
+    return max(abs(attempt.level.objective), 1e-12 * attempt.program.cost)
 
 
 def rounded_to(problem: TransferProblem, rounding: float | None) -> TransferProblem:

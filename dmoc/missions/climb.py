@@ -13,11 +13,11 @@ from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
 from dmoc.ipopt.run import Interrupt, Watch
-from dmoc.meshes.widths import WIDEST_ROUNDING
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops
 from dmoc.missions.guess import first_path, meshes_along
+from dmoc.missions.meshes import coarser, widths_of
 from dmoc.missions.sharper import onto_magnitude
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.estimate import left_after
@@ -40,8 +40,6 @@ ENDING = {"ipopt.tol": SHARP, "ipopt.acceptable_iter": 3, "ipopt.acceptable_comp
 STAYING, NEARER, VALLEY = 1.0, 0.1, 1e-2
 # Refinement to a tolerance ends after this many meshes, or on one of more steps than this.
 MOST_MESHES, MOST_STEPS = 12, 20_000
-# Where there are more than two impulses their rounding falls to this in powers of ten [-].
-LEAST_WIDTH = 1e-6
 # An impulse below so many times its rounding is none, once that is narrow enough [-].
 IDLE, NARROW = 10.0, 1e-4
 # Where an attempt fails, the free durations are tried so many times as long.
@@ -171,7 +169,16 @@ class Climb:
         return Watch(tell if self.progress else None, self.interrupt)
 
     def from_guess(self, path: MissionPath) -> Attempt:
-        """The first answer: |F| rounded widely at first, and other durations where that fails."""
+        """The first answer: |F| rounded widely at first, and other durations where that fails.
+
+        Many steps come after few: in the first iterations on many MUMPS can take minutes, and nothing stops it.
+        """
+        if (few := coarser(path)) is not None:
+            tried = self.from_guess(few)
+            if tried.solved:
+                tried = self.on_finer(tried.path.onto(path.meshes))
+            if tried.solved or tried.answer.status == "stopped":
+                return tried
         tried = self.staged(path)
         if tried.solved or tried.answer.status == "stopped" or not self.mission.free_duration:
             return tried
@@ -191,7 +198,7 @@ class Climb:
 
     def staged(self, path: MissionPath) -> Attempt:
         """An answer from a path that may be far from it, with |F| rounded widely at first."""
-        for i, width in enumerate(self._stages()):
+        for i, width in enumerate(widths_of(self.mission)):
             tried = self.attempt(path, width, MOST_TRYING, carried=i > 0)
             if not tried.solved:
                 return tried
@@ -199,24 +206,6 @@ class Climb:
             if width is not None and width <= NARROW:
                 path = path.without_idle(self.mission, IDLE * width * path.diagonal / path.duration)
         return tried
-
-    def _stages(self) -> list[float | None]:
-        """Widths of the rounding of |F| and of impulses, from wide to what is asked for."""
-        # An engine that always burns fully never comes to zero, where |F| is rounded.
-        engines = [leg.actuator for leg in self.mission.stretches]
-        own = [
-            one.smoothing
-            for one in engines
-            if one.smoothing is not None and getattr(one, "min_thrust", 0.0) < (one.force_limit() or np.inf)
-        ]
-        joints = getattr(self.mission, "joints", ())
-        if sum(event.pushes for joint in joints for event in joint.events) > 2:
-            # One of several impulses may be none at the optimum.
-            own.append(LEAST_WIDTH)
-        if not own:
-            return [None]
-        count = max(int(np.ceil(np.log10(WIDEST_ROUNDING / min(own)))), 0)
-        return [*(WIDEST_ROUNDING * 0.1**i for i in range(count)), None]
 
     def regraded(self, attempt: Attempt, meshes: list[tuple[np.ndarray, int]]) -> Attempt:
         """The answer on meshes that suit the path found, where these are others."""
@@ -246,7 +235,7 @@ class Climb:
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
             # Of arcs nothing is left to be found, but in other missions errors tell where limits set in.
-            onto = attempt.path.finer(attempt.to_cut(tol or accurate) if self.sharp else attempt.errors)
+            onto = attempt.path.finer(attempt.to_cut(tol or accurate, self.sharp, tol is not None))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS or self.work > self.most_work:
                 break
             found = self.on_finer(onto)
@@ -274,7 +263,7 @@ class Climb:
 
     def _error(self, attempt: Attempt, changes: list[float], summed: float) -> Error:
         """Estimated errors: of a leg's steps in sum, of the objective, and the integrator's miss of a leg."""
-        return Error(summed, left_after(changes), attempt.missed)
+        return attempt.counted(Error(summed, left_after(changes), attempt.missed))
 
 
 def solve_mission(

@@ -2,11 +2,11 @@
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
 equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
-within the limit: the polynomial at the size of the limit throughout, where a thrust turns at its limit; the
-polynomial drawn towards its mean; two constant pieces, for one switch; or the value of each node for as long as
-its weight, for more. Of these four each step has the one that keeps most of the control's first two moments
-about its middle, as they move the body. The limits are convex sets: the mean of the node values with the
-scheme's weights obeys them. No impulse is flown that is not paid for.
+within the limit: the polynomial at the size of the limit throughout, where a thrust turns at its limit;
+elsewhere the polynomial drawn towards its mean; two constant pieces, for one switch; or the value of each node
+for as long as its weight, for more. Of these each step has the one that keeps most of the control's first two
+moments about its middle, as they move the body. The limits are convex sets: the mean of the node values with
+the scheme's weights obeys them. No impulse is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -100,15 +100,14 @@ def _mended(
 ) -> Flown:
     """The same impulse within the limit in the steps whose polynomial breaks it, by the best way for each."""
     values, kept = nodes[:, broken], ~broken
-    ways = [
-        _turning(dynamics, rule, values, path.place.shape[1]),
-        _drawn_in(dynamics, rule, values),
-        _two_pieces(dynamics, rule, values),
-        _node_pieces(dynamics, rule, values),
-    ]
-    whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
-    wanted = _moments(rule, whole, values[:, None])
-    best = np.argmin([np.abs(_moments(rule, *way) - wanted).sum(axis=(0, 2)) for way in ways], axis=0)
+    turns, bounds, pieces = _turning(dynamics, rule, values, path.place.shape[1])
+    best, ways = np.zeros(values.shape[1], int), [(bounds, pieces)]
+    if not turns.all():
+        ways += [way(dynamics, rule, values) for way in (_drawn_in, _two_pieces, _node_pieces)]
+        whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
+        wanted = _moments(rule, whole, values[:, None])
+        off = [np.abs(_moments(rule, *way) - wanted).sum(axis=(0, 2)) for way in ways]
+        best = np.where(turns, 0, np.argmin(off, axis=0))
     begins, found = [path.mesh[:-1][kept]], [nodes[:, kept]]
     first, length = path.mesh[:-1][broken], np.diff(path.mesh)[broken]
     for number, (bounds, pieces) in enumerate(ways):
@@ -132,8 +131,10 @@ def _moments(rule: Scheme, bounds: np.ndarray, pieces: np.ndarray) -> np.ndarray
     return np.einsum("j,kn,ajkn,jkns->ans", rule.weights, lengths, powers, pieces)
 
 
-def _turning(dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int) -> tuple[np.ndarray, np.ndarray]:
-    """The polynomial of a force of `axes`, scaled to the limit throughout, in pieces; else the mean.
+def _turning(
+    dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where a force of `axes` turns at its limit; there its polynomial, scaled to it in pieces, else the mean.
 
     Its impulse differs from that of the discrete equations by as little as the scheme errs, which is added to
     all of it. Where the limit would then be broken, the control is something else than a thrust that turns.
@@ -150,7 +151,7 @@ def _turning(dynamics: Dynamics, rule: Scheme, values: np.ndarray, axes: int) ->
     turns = (np.abs(np.linalg.norm(values[..., :axes], axis=-1) - limit) <= FULL * limit).all(axis=0)
     turns &= _beyond(dynamics, inside).max(axis=(0, 1)) <= BREAKS * limit
     bounds = np.broadcast_to(TURNING, (len(mean), len(TURNING)))
-    return bounds, np.where(turns[:, None], pieces, mean)
+    return turns, bounds, np.where(turns[:, None], pieces, mean)
 
 
 def _drawn_in(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

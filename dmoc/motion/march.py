@@ -17,6 +17,7 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes, uniform_mesh
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.step import step_map
+from dmoc.parts.actuator import told_of
 from dmoc.scene.problem import TransferProblem
 
 # A forward march is built for at most this many steps and run piece by piece: a map of 100,000 steps takes
@@ -162,8 +163,7 @@ def node_masses(dynamics: Dynamics, path: DiscretePath, mass: float) -> np.ndarr
     masses = np.full(at[-1, -1] + 1, float(mass))
     if not dynamics.actuator.burns:
         return masses
-    u = ca.SX.sym("u", dynamics.controls)
-    flow = ca.Function("flow", [u], [ca.densify(dynamics.actuator.flow(u))])(path.control.T).full().ravel()
+    flow = told_of(dynamics.actuator, "flow", path.control)
     h = path.duration * np.diff(path.mesh)
     burnt = h * (rule.integral @ (np.tile(flow, (rule.degree + 1, 1)) if path.hold else flow[at]))
     before = np.concatenate([[0.0], np.cumsum(burnt[-1])])

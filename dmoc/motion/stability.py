@@ -87,7 +87,7 @@ def growth_along(
     hundred steps is nothing. So where the linearisation is constant and an eigenvalue is too large, the growth
     a step is that of the product of all matrices over that of the exact flow.
     """
-    flow, constant = flow_matrices(dynamics, path, start_time, velocity)
+    flow, constant = flow_matrices(dynamics, path, start_time, velocity), dynamics.linearised[1]
     limit = GROWTH_CONSTANT if constant else GROWTH
     if not (np.isfinite(flow).all() and np.isfinite(matrices).all()):
         return Growth(np.inf, limit, np.inf, constant)
@@ -172,16 +172,15 @@ def _rate_bound(flow: np.ndarray) -> np.ndarray:
 
 def flow_matrices(
     dynamics: Dynamics, path: DiscretePath, start_time: float, velocity: np.ndarray
-) -> tuple[np.ndarray, bool]:
-    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 freedom, 2 freedom), and whether it is constant."""
+) -> np.ndarray:
+    """d(q', v')/d(q, v) at the step ends, shape (steps+1, 2 freedom, 2 freedom)."""
     n, ends = dynamics.freedom, slice(None, None, scheme(path.order).degree)
-    function, constant = dynamics.linearised
     times = start_time + path.duration * path.mesh
-    stacked = columns(function, times, path.position[ends].T, velocity.T, path.mass[ends])[0]
+    stacked = columns(dynamics.linearised[0], times, path.position[ends].T, velocity.T, path.mass[ends])[0]
     flow = stacked.reshape(2 * n, len(times), 2 * n).transpose(1, 0, 2)
     if dynamics.configuration.joined:
         flow = flow_between_links(dynamics, path.position[ends], velocity, path.mass[0], flow)
-    return flow, constant
+    return flow
 
 
 def steps_to_turn(path: DiscretePath) -> int:
@@ -269,6 +268,8 @@ def _constant_growth(
 
     Where so many `times` of a step together grow no more than the motion does, its growth counts as 1.
     """
+    if not dynamics.linearised[1]:
+        return None
     nodes = np.linspace(0, len(guess.position) - 1, guess.order // 2 * len(lengths) + 1).round().astype(int)
     ends = np.append(0.0, np.cumsum(lengths))
     # Where the linearisation is constant all steps of one length are alike: one of each length stands for all.
@@ -280,8 +281,8 @@ def _constant_growth(
         mass=guess.mass[nodes],
         control=np.zeros((len(lengths) if guess.hold else len(nodes), guess.control.shape[1])),
     )
-    flow, constant = flow_matrices(dynamics, probe, start_time, np.zeros((len(ends), dynamics.freedom)))
-    if not constant or not np.isfinite(flow).all() or lengths.max() * _rate_bound(flow).max() < HARMLESS:
+    flow = flow_matrices(dynamics, probe, start_time, np.zeros((len(ends), dynamics.freedom)))
+    if not np.isfinite(flow).all() or lengths.max() * _rate_bound(flow).max() < HARMLESS:
         return None
     matrices = step_matrices(dynamics, probe, start_time)
     matrices = np.where(np.isfinite(matrices), matrices, 1e100)

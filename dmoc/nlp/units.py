@@ -100,7 +100,7 @@ def _limits(
 ) -> tuple[float | None, float | None]:
     """The limits of force [N] and torque [N m], or what is far above all that the scene calls for."""
     limits = problem.actuator.force_limit(), problem.actuator.torque_limit()
-    turning = turning_torque(problem, guess)
+    turning = turning_torque(problem, guess) if problem.turns else 0.0
     within = ((limit or 0.0) <= FAR_ABOVE * one for limit, one in zip(limits, (typical, turning), strict=True))
     if all(within) or has_linear_controls(problem):
         return limits

@@ -11,6 +11,8 @@ import numpy as np
 from dmoc.basics.arguments import Vector, entries
 from dmoc.basics.digits import up
 from dmoc.basics.docstrings import Duties
+from dmoc.basics.memory import remembered
+from dmoc.basics.numerics import columns
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row
@@ -266,6 +268,16 @@ class Actuator(Duties):
     def words(self) -> str:
         """One line for a person."""
         return "any force, without a limit"
+
+
+def told_of(actuator: Actuator, what: str, controls: np.ndarray) -> np.ndarray:
+    """The "throttle" [N] or the "flow" [kg/s] of controls, one row each, shape (count,)."""
+
+    def written() -> ca.Function:
+        u = ca.SX.sym("u", controls.shape[1])
+        return ca.Function(what, [u], [ca.densify(getattr(actuator, what)(u))])
+
+    return columns(remembered(written, what, actuator, controls.shape[1]), controls.T)[0].ravel()
 
 
 def limit_told(name: str, given: float | Vector, factor: float, unit: str) -> str:

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from dmoc.chains.path import cold
+from dmoc.meshes.cut_off import CutOff
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.climb import Climb
 from dmoc.missions.guess import first_path
 from dmoc.missions.sharper import onto_magnitude
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.phases.answer import answered
-from dmoc.phases.cuts import phased_leaps
+from dmoc.phases.cuts import phased_cut_off, phased_leaps
 from dmoc.phases.guess import SHORTEST, first_guess, flown_ways, on_clock
 from dmoc.phases.order import Order, as_mission
 from dmoc.phases.path import PhasedPath
@@ -50,6 +51,9 @@ class PhasedClimb(TeamClimb):
     def cut_at_leaps(self, path: Any) -> Any:
         steps = phased_leaps(self.mission, path)
         return path.cut(path.mesh, steps) if any(map(len, steps)) else None
+
+    def cut_off_between(self, path: Any) -> CutOff:
+        return phased_cut_off(self.mission, path)
 
     def straight(self, path: Any) -> Any:
         plan, leg = self.mission, path.legs[0]

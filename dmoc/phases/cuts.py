@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmoc.meshes.cut_off import CutOff
 from dmoc.phases.path import PhasedPath, suffix
 from dmoc.phases.timetable import Timetable
 from dmoc.results.between import Cut
 from dmoc.scene.problem import TransferProblem
-from dmoc.teams.cuts import leapt, team_cuts
+from dmoc.teams.cuts import cut_off_between, leapt, team_cuts
 
 
 @dataclass(frozen=True)
@@ -49,3 +50,12 @@ def phased_cuts(plan: Timetable, path: PhasedPath) -> Iterator[Cut]:
 def phased_leaps(plan: Timetable, path: PhasedPath) -> list[np.ndarray]:
     """The steps of each phase in which two bodies come too near between nodes, or one leaps into a zone."""
     return [leapt(phase_of(plan, path, i), path.phase(i)) for i in range(plan.count)]
+
+
+def phased_cut_off(plan: Timetable, path: PhasedPath) -> CutOff:
+    """What bodies cut off the distances that they keep, in all phases, as `dmoc.teams.cuts.cut_off_between`."""
+    found = [cut_off_between(phase_of(plan, path, i), path.phase(i), suffix(i)) for i in range(plan.count)]
+    steps, depth = (
+        np.concatenate(part) for part in zip(*((one.steps, one.depth) for one in found), strict=True)
+    )
+    return CutOff(sum(one.cost for one in found), steps, depth)

@@ -119,7 +119,7 @@ def _cuts_of(
         speed = max(speed, float(np.linalg.norm(velocity, axis=1).max()))
     longest = float(np.linalg.norm(np.diff(place, axis=0), axis=1).max())
     smallest = min(constraint.feature() for _, constraint in ours)
-    inside, chord, moving, straight = _inside_gaps(smallest, path, place, velocity, longest)
+    inside, chord, moving, straight = inside_gaps(smallest, path, place, velocity, longest)
     parts = (len(inside) - 1) // (len(path.position) - 1)
     fractions = np.interp(np.arange(len(inside)) / parts, np.arange(len(path.position)), path.fractions)
     times = start_time + path.duration * fractions
@@ -231,7 +231,7 @@ def _steps(path: DiscretePath, broken: np.ndarray) -> np.ndarray:
     return np.unique(gap // scheme(path.order).degree)
 
 
-def _inside_gaps(
+def inside_gaps(
     smallest: float, path: DiscretePath, q: np.ndarray, v: np.ndarray, longest: float
 ) -> tuple[np.ndarray, ...]:
     """Path, chord, velocity and its linear interpolation at the nodes and inside every gap between two.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 
 from dmoc.basics.numerics import columns
@@ -16,6 +15,7 @@ from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath
 from dmoc.motion.reference import goal_miss
 from dmoc.motion.scales import least_extent, path_scales
 from dmoc.motion.step import step_map
+from dmoc.parts.actuator import told_of
 from dmoc.results.facts import Error
 from dmoc.results.flown_cost import TINY, unpriced
 from dmoc.scene.problem import TransferProblem
@@ -100,9 +100,7 @@ def idle_share(dynamics: Dynamics, path: DiscretePath) -> float:
     # The magnitude of such a force does not hang on the place.
     anywhere = np.repeat(path.position[:1], len(controls), axis=0)
     thrust = np.linalg.norm(wrench_of(dynamics, anywhere, controls), axis=1).reshape(fine.shape[:2])
-    u = ca.SX.sym("u", fine.shape[2])
-    throttle = ca.Function("throttle", [u], [dynamics.actuator.throttle(u)])
-    paid = throttle(fine.reshape(-1, fine.shape[2]).T).full().reshape(fine.shape[:2])
+    paid = told_of(dynamics.actuator, "throttle", controls).reshape(fine.shape[:2])
     total = float(many.weights @ paid @ h)
     # Elsewhere the two differ by the rounding of |F| alone, which is counted by itself.
     idle = float(many.weights @ (paid - thrust) @ (h * switching))
@@ -119,8 +117,7 @@ def rounded_share(dynamics: Dynamics, path: DiscretePath) -> float:
     weights = path.duration * (np.diff(path.mesh) if path.hold else node_weights(path.mesh, scheme(path.order)))
     anywhere = np.repeat(path.position[:1], len(path.control), axis=0)
     thrust = np.linalg.norm(wrench_of(dynamics, anywhere, path.control), axis=1)
-    u = ca.SX.sym("u", path.control.shape[1])
-    paid = ca.Function("throttle", [u], [dynamics.actuator.throttle(u)])(path.control.T).full().ravel()
+    paid = told_of(dynamics.actuator, "throttle", path.control)
     scales = path_scales(path)
     moving = path.mass[0] * scales.speed if path.coordinates.speeds.any() else 0.0
     return float(weights @ np.maximum(paid - thrust, 0.0) / max(weights @ paid, MOVES * moving, TINY))

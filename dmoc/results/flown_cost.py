@@ -16,6 +16,7 @@ from dmoc.motion.flown import flown
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath
+from dmoc.parts.actuator import told_of
 from dmoc.scene.problem import TransferProblem
 
 # An objective of 0 is replaced by this, the smallest number of full precision, before something is divided by
@@ -135,9 +136,8 @@ def costs_along(
     own = problem.objective.paid_at_goal is problem.objective
     worth = mass_worth(problem) if of_way and own else 0.0
     if worth:
-        u = ca.SX.sym("u", problem.controls)
-        flow = ca.Function("flow", [u], [problem.actuator.flow(u)])(np.concatenate(controls).T)
-        rates = rates - worth * np.array(flow).reshape(rates.shape)
+        flow = told_of(problem.actuator, "flow", np.concatenate(controls))
+        rates = rates - worth * flow.reshape(rates.shape)
     last = guess.goal_velocity[guess.coordinates.speeds]
     end = float(terminal(times[-1], guess.place[-1], last, guess.mass[-1])) - worth * float(guess.mass[-1])
     return [float(np.trapezoid(row, times)) + end for row in rates]

@@ -39,6 +39,8 @@ MOST_LETTING_GO, MOST_LET_GO = 60, 30
 # On the way to a path that a wide rounding of |F| would find sooner, it is first this many times as wide. Where
 # propellant burns that no cost counts it is over these parts of the largest thrust [-].
 WIDER, UNPAID = 10.0, [WIDEST_UNPAID, 0.1, 0.01]
+# A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
+LEAST_HALVED = 9
 # A throttle is far from zero if it is everywhere more than this many times the widest rounding of |F| [-]: that
 # changes |F| by 2 % at most.
 FAR = 5.0
@@ -133,6 +135,16 @@ def told(cause: Cause, problem: TransferProblem, holds: Callable[[TransferProble
     # Between several attractors a guess may pass on the wrong side of one, where far more is needed.
     local = problem.attraction.first is not None and problem.attraction.lone is None
     return (cause.proven(holds) if holds else cause).words(local)
+
+
+def by_half(solve_on: Callable[[DiscretePath], Rung], failed: Rung, first: DiscretePath) -> Rung:
+    """A second attempt by way of half as many steps, where a mesh fails without a reason: it often works."""
+    if len(first.mesh) < LEAST_HALVED:
+        return failed
+    half = solve_on(first.onto(np.append(first.mesh[:-1:2], 1.0), first.order, first.hold))
+    if not half.solved:
+        return half if half.stopped else failed
+    return replace(solve_on(half.path.onto(first.mesh, first.order, first.hold)), cause=failed.cause)
 
 
 def held_answer(problem: TransferProblem, try_on: Callable[..., Rung], start: DiscretePath) -> Rung | None:

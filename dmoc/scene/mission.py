@@ -11,6 +11,7 @@ from dmoc.basics.arguments import both_ends, checked, entries, number, short
 from dmoc.basics.docstrings import Named
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
+from dmoc.ends.on_limits import refuse_mission_ends
 from dmoc.legs.ends import Loose
 from dmoc.legs.events import Event, Impulse
 from dmoc.legs.legs import Joint, Leg, checked_sums, span_of, start_times
@@ -112,6 +113,7 @@ class Mission(Named):
                 part.check_dimension(self.dimension)
         self._check_impulses()
         _ = self.stretches
+        refuse_mission_ends(self, self._whole)
         clock_of(self)
 
     @property
@@ -226,7 +228,8 @@ class Mission(Named):
         goal = Loose.like(self.start) if self.closes else self.goal
         shortest, longest = self.duration_bounds
         span = shortest if shortest == longest else (shortest, longest)
-        return self._of_leg(self.plan[0], self.start, goal, span, self.leg_names[0])
+        leg = replace(self.plan[0], constraints=())
+        return self._of_leg(leg, self.start, goal, span, self.leg_names[0])
 
     def _complete_ends(self) -> None:
         axes = self.start.dimension or self.goal.dimension

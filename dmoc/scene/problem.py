@@ -11,10 +11,11 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Named
-from dmoc.configurations.of_problem import free_configuration, unknown_parts
+from dmoc.configurations.of_problem import unknown_parts
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.mixed import with_both
+from dmoc.ends.on_limits import refuse_ends_beyond_limits
 from dmoc.ends.wheels import with_wheels
 from dmoc.links.holonomic import Holonomic
 from dmoc.links.system import System
@@ -130,7 +131,8 @@ class TransferProblem(Named):
         check_limited(self)
         check_functions(self)
         self._check_objective()
-        self._check_ends()
+        if self.constraints:
+            refuse_ends_beyond_limits(self)
         check_pushed(self)
         check_links(self)
         if self.actuator.dry_mass >= self.mass:
@@ -229,29 +231,6 @@ class TransferProblem(Named):
                 f"start_time {self.start_time:g} s is too late to tell times within {shortest:g} s apart; "
                 "count time from nearer"
             )
-
-    def _check_ends(self) -> None:
-        """A boundary state that breaks a constraint can never be met, whatever the path."""
-        made = free_configuration(self).coordinates if self.constraints else None
-        for end in ("start", "goal"):
-            position, velocity = getattr(self, end).fixed()
-            for i, constraint in enumerate(self.constraints):
-                state = constraint.seen_of(made, position[None], velocity[None])
-                known = state[1] if constraint.limits_speed else state[0]
-                if np.isnan(known).any():
-                    continue
-                # A state on the limit itself may lie beyond it by the rounding of its own numbers.
-                excess = float(constraint.excess_at(np.array([self._time_of(end)]), *state)[0])
-                if excess > 1e-9 * (np.abs(known).max() or 1.0):
-                    name = f"{type(constraint).__name__} (constraint {i + 1})"
-                    raise ValueError(
-                        f"{end} breaks {name} by {excess:.3g} {constraint.unit}: "
-                        f"{constraint.subject} {constraint.words()}; move the {end} or the constraint"
-                    )
-
-    def _time_of(self, end: str) -> float:
-        """The time of an end [s]; of the goal of a free duration the earliest."""
-        return self.start_time + (self.duration_bounds[0] if end == "goal" else 0.0)
 
     def _check_objective(self) -> None:
         sought = [type(term) for weight, term in self.objective.terms if weight]

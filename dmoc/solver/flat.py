@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.memory import remembered
 from dmoc.configurations.acting import state_symbols
 from dmoc.guess.open_ends import end_estimates, two_burns, velocity_change_between
 from dmoc.meshes.widths import WIDEST_ROUNDING, rounding_stages
@@ -92,7 +93,7 @@ def _may_be_flat(problem: TransferProblem) -> bool:
     between_orbits = problem.attraction.lone is not None and open_place and not problem.free_duration
     if not between_orbits or limit is None or problem.constraints:
         return False
-    if _aims_at_a_place(problem) or not has_linear_controls(problem):
+    if not has_linear_controls(problem) or _aims_at_a_place(problem):
         return False
     ends = end_estimates(problem, duration)
     if not np.isfinite(ends).all():
@@ -102,5 +103,9 @@ def _may_be_flat(problem: TransferProblem) -> bool:
 
 def _aims_at_a_place(problem: TransferProblem) -> bool:
     """Whether the objective is one of the place or velocity at the goal: it takes all the thrust there is."""
-    t, q, v, m = state_symbols(problem.dimension)
-    return bool(ca.depends_on(ca.SX(problem.objective.terminal(t, q, v, m)), ca.vertcat(q, v)))
+
+    def found() -> bool:
+        t, q, v, m = state_symbols(problem.dimension)
+        return bool(ca.depends_on(ca.SX(problem.objective.terminal(t, q, v, m)), ca.vertcat(q, v)))
+
+    return remembered(found, "aims at a place", problem.objective, problem.dimension)

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.diagnosis.cause import Cause, confirmed_cause, idle_share
+from dmoc.diagnosis.cause import Cause
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
+from dmoc.diagnosis.search import confirmed_cause, lacks_propellant
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
@@ -29,14 +30,12 @@ from dmoc.results.solution import Solution
 from dmoc.results.switches import burns_unpaid
 from dmoc.rungs import rung as rungs
 from dmoc.rungs.full import at_full_force
-from dmoc.rungs.rung import Rung, answered, cut_short, held_answer, nowhere_zero, rounded, settled, told
+from dmoc.rungs.rung import Rung, held_answer, nowhere_zero, rounded, settled, told
 from dmoc.rungs.tube import FROM_HALFWAY, HALFWAY, around, in_tube, led, out_of_tube
 from dmoc.scene.problem import TransferProblem
 
 # The cause of a failure is looked for on meshes of up to this many nodes, where that takes little time.
 MOST_EXPLAINED = 2000
-# A mesh that fails without a reason is tried again with half its steps if it has at least this many step ends.
-LEAST_HALVED = 9
 # Where a transfer of free duration fails, its guess may be too short: another one lasts so many times as long.
 LONGER = 10
 # Where it was as long as may be, so many shorter durations are tried.
@@ -65,7 +64,9 @@ class Ladder:
         # Whether a problem that a message names has an answer, if somebody can say.
         self.holds: Callable[[TransferProblem], bool] | None = None
         self.patient = True  # a finer mesh is tried where a coarse one has no path
+        self._limited = any("max_" in name for name in options or ())
         self.rungs, self._levels = list[Rung](), list[Level]()  # all attempts so far
+        self._last: Rung | None = None  # the last one at the problem itself
         self.tell = self._levels.append  # takes attempts that were made elsewhere
 
     def climb_to(self, first: DiscretePath, given: Any = None) -> Rung:
@@ -79,6 +80,9 @@ class Ladder:
         anew = len(meshes) > 1 and not first.multipliers
         known = starting_guess(self.problem, meshes[0], order, first.hold, given) if anew else first
         refuse_undefined_motion(self.dynamics, self.problem, known)
+        last = self._last
+        if last and not last.solved and (cause := lacks_propellant(self.problem, known, self)):
+            return replace(last, cause=cause)
         if first.multipliers:
             return self._explained(self.solve_on(first), first, None, None)
         cause, curved = None, is_curved(self.problem, first)
@@ -95,7 +99,7 @@ class Ladder:
                 return rung
             # A coarse mesh may have no path where a finer one does: then go on from the first guess.
             known = rung.path if rung.solved else first
-        return rung if rung.solved else self._by_half(rung, first)
+        return rungs.by_half(self.solve_on, rung, first) if self._unexplained(rung) else rung
 
     def _solved_or_explained(
         self, start: DiscretePath, first: DiscretePath, rounding: float | None, known: Cause | None, last: bool
@@ -105,8 +109,8 @@ class Ladder:
         From a guess it is tried in few iterations first, as the search for a cause may find a path; not on the
         last mesh if a cause is known from one before.
         """
-        given = any("max_" in name for name in self.options or ())
-        quick = not (start.multipliers or (last and known) or given) and len(start.position) <= MOST_EXPLAINED
+        given = start.multipliers or (last and known) or self._limited
+        quick = not given and len(start.position) <= MOST_EXPLAINED
         rung = self._solved_sooner_or_later(start, first, rounding, MOST_TRYING if quick else None)
         rung = self._explained(rung, start, rounding, known)
         if not quick or not self._unexplained(rung):
@@ -135,19 +139,8 @@ class Ladder:
 
     def _unexplained(self, rung: Rung) -> bool:
         """Whether an attempt failed without a reason; one that the user cut short has a reason."""
-        limited = any("max_" in name for name in self.options or ())
-        told = rung.cause is not None and rung.cause.words()
-        return rung.answer.status in UNEXPLAINED and not limited and not told
-
-    def _by_half(self, failed: Rung, first: DiscretePath) -> Rung:
-        """A second attempt by way of half as many steps, if a mesh fails without a reason: it often works."""
-        if not self._unexplained(failed) or len(first.mesh) < LEAST_HALVED:
-            return failed
-        half = self.solve_on(first.onto(np.append(first.mesh[:-1:2], 1.0), first.order, first.hold))
-        if half.solved:
-            again = self.solve_on(half.path.onto(first.mesh, first.order, first.hold))
-            return replace(again, cause=failed.cause)
-        return half if half.stopped else failed
+        told = self._limited or (rung.cause is not None and rung.cause.words())
+        return rung.answer.status in UNEXPLAINED and not told
 
     def _explained(self, rung: Rung, start: DiscretePath, rounding: float | None, known: Cause | None) -> Rung:
         """A failed attempt with its cause; if the search for it finds a path, the answer from there."""
@@ -155,12 +148,11 @@ class Ladder:
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
         problem = rounded(self.problem, rounding)
-        cause = confirmed_cause(problem, start, self._levels.append, self.interrupt)
+        cause = confirmed_cause(problem, start, self.tell, self.interrupt, self.problem)
         if self.interrupt.seen:
             return replace(rung, answer=replace(rung.answer, status="stopped"))
         if cause.path is None:
-            coarse = cause.coarse or cause.excess < idle_share(problem) - idle_share(self.problem)
-            return replace(rung, cause=replace(cause, coarse=coarse))
+            return replace(rung, cause=cause)
         return self.solve_on(cause.path, rounding, MOST_TRYING)
 
     def try_on(
@@ -250,7 +242,7 @@ class Ladder:
         pinned: bool = False,
         lean: float = 0.0,
     ) -> Rung:
-        last = next((one for one in reversed(self.rungs) if not one.level.question), None)
+        last = self._last
         if last is not None and not question and self.interrupt.seen:
             return replace(last, answer=replace(last.answer, status="stopped"))
         begun = time.perf_counter()
@@ -272,11 +264,13 @@ class Ladder:
         if watch.error is not None:
             raise watch.error
         level = replace(nlp.level(answer, built), question=question)
-        asked = problem if question else answered(self.problem, problem)
+        asked = problem if question else rungs.answered(self.problem, problem)
         pull = nlp.pull(nlp.unpack(answer.x, problem), guess, lean) if lean else 0.0
-        self.rungs.append(Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull))
+        rung = Rung(len(self._levels), asked, nlp, answer, level, pinned=pinned, pull=pull)
+        self.rungs.append(rung)
         self._levels.append(level)
-        return self.rungs[-1]
+        self._last = self._last if question else rung
+        return rung
 
     def solution(self, rung: Rung, errors: dict[int, float] | None = None, **found: Any) -> Solution:
         """The answer of one rung as a Solution with the whole ladder; `errors` by the number of the rung.
@@ -291,10 +285,13 @@ class Ladder:
         message = "a local optimum" if rung.solved else reason or advice_of(rung.answer.status, self.options)
         worst = () if rung.solved else worst_in_units(rung.nlp, rung.problem, rung.answer.x, rung.answer.g)
         more = {"worst": worst, "warnings": rung.warnings(), **found}
-        return rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
+        solution = rung.nlp.solution(rung.problem, rung.answer, levels, message, self.options, **more)
+        # What would be enough may have been left unproven.
+        late = not (rung.solved or reason) and self.interrupt.late
+        return rungs.cut_short(solution, self.interrupt.seconds, False) if late else solution
 
     def _out_of_time(self, rung: Rung, errors: dict[int, float] | None, **found: Any) -> Solution:
         """The best that there is when the time is over: the last answer to the problem, or the last iterate."""
         answers = [one for one in self.rungs if one.solved and not one.level.question]
         best = answers[-1] if answers else replace(rung, answer=replace(rung.answer, status="failed"))
-        return cut_short(self.solution(best, errors, **found), self.interrupt.seconds, bool(answers))
+        return rungs.cut_short(self.solution(best, errors, **found), self.interrupt.seconds, bool(answers))

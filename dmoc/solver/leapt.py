@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.diagnosis.cause import confirmed_cause
+from dmoc.diagnosis.search import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import coarse_to_fine

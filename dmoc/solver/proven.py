@@ -21,6 +21,8 @@ def holds(ladder: Ladder, problem: TransferProblem, solved: Callable[[Ladder], S
     first mesh that fails, which is mostly the one on which the remedy was found; but where |F| is rounded, more
     of it on the first meshes, a later one may do.
     """
+    if ladder.interrupt.seen:
+        return False
     options = {"ipopt.max_iter": MOST_TRYING} | (ladder.options or {})
     trial = Ladder(problem, options, compiled=ladder.compiled)
     trial.interrupt, trial.patient = ladder.interrupt, problem.actuator.smoothing is not None

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dmoc.meshes.cut_off import CutOff, cut_off
 from dmoc.meshes.cuts import PARTS, SHORTEST, cut, cuts_of
 from dmoc.motion.path import DiscretePath
 from dmoc.results.estimate import (
@@ -161,7 +162,14 @@ class Refinement:
             self.reason += ALIKE.format(moved)
 
     def _cuts(self, path: DiscretePath, objective: float, longest: float) -> tuple[np.ndarray, float]:
-        """Into how many parts to cut each step, and by how much the error falls then at most.
+        """Into how many parts to cut each step, and by how much the error falls then at most."""
+        parts, most = self._cuts_for_errors(path, objective, longest)
+        return np.maximum(parts, self._past(path, objective).parts(self.tol)), most
+
+    def _cuts_for_errors(
+        self, path: DiscretePath, objective: float, longest: float
+    ) -> tuple[np.ndarray, float]:
+        """The same by the errors of the steps and where controls switch.
 
         Where a control jumps the error falls with the length of the step there alone.
         """
@@ -182,6 +190,7 @@ class Refinement:
         brings it down.
         """
         found = estimate(self.problem, self.ladder.dynamics, path, rung.level.objective, self.changes, most)
+        found = self._past(path, rung.level.objective, NOTHING * rung.nlp.units.cost).counted(found)
         met = found.largest <= self.tol
         rounded = rounding_cost(self.problem, path) / max(abs(rung.level.objective), TINY)
         found = replace(found, objective=found.objective + rounded)
@@ -192,6 +201,11 @@ class Refinement:
             self.worse += 1
         self.rounded = rounded
         return met
+
+    def _past(self, path: DiscretePath, objective: float, least: float = TINY) -> CutOff:
+        """What a path cuts off its limits between its nodes, of its cost, or of `least` if that is more."""
+        passed = cut_off(self.problem, self.ladder.dynamics, path, self.problem.start_time)
+        return passed.of(max(abs(objective), least))
 
     def _released(self, rung: Rung) -> Rung:
         """An optimum on the same mesh; another path of the same cost is no error of the mesh."""

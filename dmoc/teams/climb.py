@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from dmoc.chains.path import cold
-from dmoc.missions.attempt import Attempt
+from dmoc.meshes.cut_off import CutOff
+from dmoc.missions.attempt import Attempt, cost_scale
 from dmoc.missions.climb import Climb
 from dmoc.missions.meshes import mesh_around
 from dmoc.missions.sharper import onto_magnitude
@@ -21,7 +22,7 @@ from dmoc.scene.team import Team
 from dmoc.solver.ladder import Ladder
 from dmoc.solver.solve import check_numerics
 from dmoc.teams.answer import answered
-from dmoc.teams.cuts import leapt
+from dmoc.teams.cuts import cut_off_between, leapt
 from dmoc.teams.guess import aimed, bent_apart, guessed, other_sides
 from dmoc.teams.path import TeamPath
 from dmoc.teams.program import TeamProgram
@@ -66,7 +67,13 @@ class TeamClimb(Climb):
         path: Any = attempt.path
         if not path.touches:
             return error
-        return replace(error, objective=max(changes[-1], *[0.25 * change for change in changes[-2:-1]], 0.0))
+        seen = changes[-1], *[0.25 * change for change in changes[-2:-1]]
+        error = replace(error, objective=max(error.objective, *seen))
+        return self.cut_off_between(path).of(cost_scale(attempt)).counted(error)
+
+    def cut_off_between(self, path: Any) -> CutOff:
+        """What bodies cut off the distances that they keep, between the nodes."""
+        return cut_off_between(self.mission, path)
 
     def cut_at_leaps(self, path: Any) -> Any:
         """A path on steps cut in two in which bodies come too near between nodes; None if there are none."""

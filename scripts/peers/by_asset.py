@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import asset_asrl
@@ -45,14 +47,14 @@ class Motion(control.ODEBase):
         super().__init__(functions.stack(rates), size, task.controls)
 
 
-def solve(task: Task, method: str, *segments: int) -> Answer:
+def solve(task: Task, method: str, *segments: int) -> Callable[[], Answer]:
     """One solve from the statement, on so many equal segments, and again on finer ones from what was found."""
     phase = _phase(task, method, segments[0])
     done = phase.optimize()
     for count in segments[1:]:
         phase.refineTrajEqual(count)
         done = phase.optimize()
-    return _answer(task, method, np.array(phase.returnTraj()), str(done))
+    return partial(_answer, task, method, np.array(phase.returnTraj()), str(done))
 
 
 def _phase(task: Task, method: str, segments: int) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -84,7 +85,7 @@ class Found:
     status: str = ""
 
 
-def solve(task: Task, method: str, *steps: int) -> Answer:
+def solve(task: Task, method: str, *steps: int) -> Callable[[], Answer]:
     """One solve from the statement, on so many equal steps, and again on finer ones from what was found."""
     found = None
     for count in steps:
@@ -92,15 +93,19 @@ def solve(task: Task, method: str, *steps: int) -> Answer:
             plain(task, count, found) if method == "(16)" else collocated(task, RULES[method](), count, found)
         )
     assert found is not None
+    return partial(_answer, task, method, steps[-1], found)
+
+
+def _answer(task: Task, method: str, steps: int, found: Found) -> Answer:
     last = found.states[:, -1:].T
     end = (in_plane(last) if task.polar else last)[0, : task.axes]
     if method == "(16)":
-        nodes = np.arange(steps[-1])[:, None] + np.arange(2)
+        nodes = np.arange(steps)[:, None] + np.arange(2)
     else:
         rule = RULES[method]()
         count = len(rule.controls)
-        nodes = np.arange(steps[-1])[:, None] * (count - rule.shared) + np.arange(count)
-    times, mesh = task.duration * found.at_controls, np.linspace(0.0, task.duration, steps[-1] + 1)
+        nodes = np.arange(steps)[:, None] * (count - rule.shared) + np.arange(count)
+    times, mesh = task.duration * found.at_controls, np.linspace(0.0, task.duration, steps + 1)
     return Answer(found.objective, mesh, times[nodes], found.controls.T[nodes], end, status=found.status)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -59,13 +61,15 @@ def _circular(t, q, v, m):
     return [q[0] * v[0] + q[1] * v[1], (v[0] ** 2 + v[1] ** 2) ** 2 * square - 1]
 
 
-def solve(task: Task, order: int | None, steps: int | None = None, tol: float | None = None) -> Answer:
+def solve(
+    task: Task, order: int | None, steps: int | None = None, tol: float | None = None
+) -> Callable[[], Answer]:
     """One solve from the statement, with an order and a number of steps, or with a tolerance alone."""
     stated = problem(task)
     found = optimum(stated, order=order, steps=steps, tol=tol, guess=_guess(stated, task, order or GUESSED))
     # an effort is half the integral of |F|^2
     share = 1.0 if task.thrust else 2 * task.weight
-    return _answer(found, share * found.objective)
+    return partial(_answer, found, share * found.objective)
 
 
 def _guess(stated: TransferProblem, task: Task, order: int) -> DiscretePath:

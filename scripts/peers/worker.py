@@ -3,7 +3,8 @@
     python -m peers.worker asset P3 '["LGL7", 8]' 2
 
 First, then so many times more, or once if solves take long. What the tool imports is loaded before; building
-the problem and solving it is timed, the first time with whatever the tool loads only then.
+the problem and solving it is timed, the first time with whatever the tool loads only then. What turns its
+answer into the terms that all share is not.
 """
 
 import importlib
@@ -21,9 +22,9 @@ def main() -> None:
     seconds = []
     while len(seconds) < 2 or (len(seconds) <= int(again) and sum(seconds) < BRIEF):
         begun = time.process_time()
-        answer = by.solve(tasks.TASKS[name], *json.loads(mesh))
+        found = by.solve(tasks.TASKS[name], *json.loads(mesh))
         seconds.append(time.process_time() - begun)
-    print(json.dumps({"seconds": seconds, "answer": answer.plain()}))
+    print(json.dumps({"seconds": seconds, "answer": found().plain()}))
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from dmoc import (
     BallForce,
     BallTorque,
     BoxForce,
+    CircularOrbit,
     ClohessyWiltshire,
     Constraint,
     Engine,
@@ -34,6 +35,7 @@ from dmoc import (
     Moving,
     Nozzles,
     On,
+    PointGravity,
     PointingKeepIn,
     PointingKeepOut,
     Pose,
@@ -57,6 +59,7 @@ from dmoc import (
     verify,
 )
 from dmoc.motion.stability import OPEN
+from dmoc.scene.problem_file import load_problem
 
 NUMBER = r"(-?[\d.]+(?:e[+-]?\d+)?)"
 J = (1.0, 2.0, 2.8)
@@ -98,6 +101,17 @@ def loaded(dry):
 def half(dry):
     """The dry mass that leaves half of the propellant: how much more than needed is named is not said."""
     return (1.7 - 0.5 * (1.7 - dry),)
+
+
+def raised(dry):
+    """To a larger circular orbit: in a longer time an engine needs hardly less propellant."""
+    engine = Engine(0.15, exhaust_velocity=1.8, dry_mass=dry)
+    ends = State((1.0, 0.0), (0.0, 1.0)), CircularOrbit(1.3, mu=1.0)
+    return TransferProblem(1.0, *ends, 5.0, effects=[PointGravity(1.0)], actuator=engine)
+
+
+def half_of_raised(dry):
+    return (1.0 - 0.5 * (1.0 - dry),)
 
 
 def under(radius, **more):
@@ -249,6 +263,12 @@ SCENES = {
         [((0, 1), THRUST + ".*? and a force limit of # N [(].*? along each axis")],
     ),
     "dry mass": (loaded, (1.64,), {"steps": 100}, [((0,), "a dry mass of # kg [(]", half)]),
+    "dry mass around an attractor": (
+        raised,
+        (0.98,),
+        {},
+        [((0,), "a dry mass of # kg [(]you gave 0.98 kg, which leaves too little propellant", half_of_raised)],
+    ),
     "speed": (
         lambda v, t: hop((10.0, 0.0), t, constraints=[SpeedLimit(v)]),
         (1.5, 5.0),
@@ -508,3 +528,22 @@ def test_the_program_finds_steps_that_are_enough_where_few_are_refused(name):
 def test_a_scene_of_a_hundred_oscillations_is_not_refused_for_its_default_steps():
     """On 400 steps h omega would be 2.5."""
     assert holds(swung(Spring(100.0, (0.0, 0.0)), duration=100.0))
+
+
+def to_mars(dry):
+    """In least time, with an engine that burns throughout if it may."""
+    problem = load_problem("earth_mars").make()
+    return replace(problem, actuator=replace(problem.actuator, dry_mass=dry))
+
+
+def test_a_lack_of_propellant_is_named_before_much_else_is_tried():
+    """Half the propellant of the cheapest way, 0.095 kg: no rows of mass flow, and no thousand iterations."""
+    failed = solve(to_mars(0.95))
+    named = re.search("the transfer needs a dry mass of # kg".replace("#", NUMBER), failed.message)
+    assert named and 0.9 < float(named[1]) < 1 - 0.0954
+    assert sum(level.iterations for level in failed.ladder) < 1000
+
+
+@pytest.mark.slow
+def test_the_propellant_that_is_named_is_enough_in_least_time():
+    assert holds(to_mars(0.9))

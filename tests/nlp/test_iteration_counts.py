@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import pytest
 
-from dmoc import solve
+from dmoc import BoxForce, Effort, solve
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import rounding, tolerance
 from dmoc.motion.mesh import uniform_mesh
@@ -139,6 +139,14 @@ def test_a_fine_smooth_mesh_is_one_iteration_away_from_a_coarse_one_of_order_six
     coarse, fine = solve(load_problem("orbit_raise").make(), order=2, steps=12_800).raise_for_status().ladder
     assert (coarse.order, coarse.steps) == (6, 66)
     assert fine.iterations == 1
+
+
+def test_a_fine_mesh_at_the_limits_of_zones_takes_no_more_iterations_than_a_coarse_one():
+    """The barrier counts nodes: what is carried with too large a one is led away from its limits first."""
+    problem = replace(load_problem("free_flyer").make(), actuator=BoxForce(0.6), objective=Effort())
+    *_, coarse, fine = solve(problem, order=2, steps=1_600, structure=False).raise_for_status().ladder
+    assert coarse.steps == 400
+    assert fine.iterations <= coarse.iterations + 1
 
 
 if __name__ == "__main__":

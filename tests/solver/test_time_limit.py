@@ -4,10 +4,11 @@ import json
 
 import pytest
 
-from dmoc import load, solve
+from dmoc import BallForce, State, TransferProblem, load, solve
 from dmoc.cli.app import main
 from dmoc.ipopt import run as ipopt
 from dmoc.scene.problem_file import load_problem
+from dmoc.solver.proven import QUESTION
 from dmoc.structure.coarse import coarse_answer
 
 
@@ -58,6 +59,25 @@ def test_the_search_for_a_cause_ends_in_time():
     tried = [level.iterations for level in whole.ladder if not level.question]
     cut = solve(problem, time_limit=0.01 * (tried[0] + 0.5 * asked[0]))
     assert "time limit" in cut.message and cut.iterations < sum(tried[:1]) + sum(asked[:1])
+
+
+def test_what_is_not_proven_in_time_is_neither_named_nor_tried_on():
+    still = (0.0, 0.0)
+    problem = TransferProblem(1.0, State(still, still), State((4.0, 1.0), still), 4.0, actuator=BallForce(0.5))
+    whole = solve(problem, steps=40)
+    before = sum(level.iterations + 2 for level in whole.ladder if level.question != QUESTION)
+    proofs = sum(level.question == QUESTION for level in whole.ladder)
+    cut = solve(problem, steps=40, time_limit=0.01 * before)
+    assert not whole.success and "force limit" in whole.message and proofs > 1
+    assert "the time limit" in cut.message and "force limit" not in cut.message
+    assert sum(level.question == QUESTION for level in cut.ladder) < proofs
+
+
+def test_a_mission_of_many_steps_is_solved_on_few_first():
+    """From a guess an iteration on 2,000 steps took four minutes, in which no clock is looked at."""
+    solution = solve(load_problem("two_stage_ascent").make(), steps=200)
+    assert solution.success
+    assert [level.steps for level in solution.ladder] == [200, 400]
 
 
 @pytest.mark.parametrize("limit, code", [("0.03", 3), ("2", 4)])

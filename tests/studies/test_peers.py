@@ -55,14 +55,14 @@ def test_fifteen_revolutions_cost_what_is_known_of_them():
 def test_by_hand_and_by_dmoc_come_to_the_same(name):
     task = TASKS[name]
     by_hand, ours = (MESHES[tool][name][0] for tool in ("casadi", "dmoc"))
-    answers = by_casadi.solve(task, *by_hand), by_dmoc.solve(task, *ours)
+    answers = by_casadi.solve(task, *by_hand)(), by_dmoc.solve(task, *ours)()
     assert [error(task, answer) < 1e-3 for answer in answers] == [True, True]
 
 
 def test_the_error_is_that_of_the_control_flown():
     """A control that is off by a hundredth misses the goal, whatever it claims."""
     task = TASKS["P3"]
-    answer = by_casadi.solve(task, "Legendre 4", 6)
+    answer = by_casadi.solve(task, "Legendre 4", 6)()
     wrong = Answer.of({**answer.plain(), "controls": (1.01 * answer.controls).tolist()})
     assert error(task, answer) < 1e-5 and 1e-3 < error(task, wrong) < 1e-1
     cheap = Answer.of({**answer.plain(), "objective": 0.9 * answer.objective})
@@ -71,8 +71,8 @@ def test_the_error_is_that_of_the_control_flown():
 
 def test_forces_along_axes_and_along_the_radius_fly_alike():
     task = TASKS["P3"]
-    answer = by_casadi.solve(task, "Legendre 4", 12)
-    ours = by_dmoc.solve(task, 8, 16)
+    answer = by_casadi.solve(task, "Legendre 4", 12)()
+    ours = by_dmoc.solve(task, 8, 16)()
     assert ours.fixed and not answer.fixed
     np.testing.assert_allclose(fly(task, answer)[-1], fly(task, ours)[-1], atol=1e-6)
 
