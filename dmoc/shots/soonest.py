@@ -29,14 +29,14 @@ FLIGHT_TOLERANCE, MOST_STEPS = 1e-10, 1_000_000
 SEEN = 65
 # The place of arrival is looked for over so many radians before and after that of the mean motion, at so many
 # places.
-REACH, TRIED = 3 * np.pi, 361
+REACH, TRIED = 3 * np.pi, 1441
 # At most so many places are tried.
 MOST_PLACES = 5
 # A flight meets the goal if its elements are so near [-] and its angle so near [rad]; those that do take one to
 # three.
 NEAR, NEAR_ANGLE, MOST_FLIGHTS = 1e-6, 1e-3, 4
 # Another place than the natural one costs at least so much [-], up to where it is out of the question.
-LEAST_COST, MOST_COST = 1e-3, 1e6
+LEAST_COST, MOST_COST = 1e-3, 1e2
 
 
 @dataclass(frozen=True)
@@ -165,9 +165,16 @@ def _corrected(
             return Aim(averaged, z)
         if not np.isfinite(jacobian).all():
             return None
-        change = np.linalg.lstsq(jacobian, -off, rcond=1e-12)[0]
+        inverse = np.linalg.pinv(jacobian, 1e-12)
+        change, scales = -inverse @ off, np.ones(len(z))
+        scales[place] /= z[place]
         share = min(1.0, LONGER * z[place] / (abs(change[place]) or 1.0))
-        while not np.linalg.norm(averaged.shot(z + share * change, wave, False)[0]) < (1 - 0.1 * share) * size:
+
+        # A step is judged by the correction that it leaves (P. Deuflhard, 2004): equations differ in size.
+        def left(of: np.ndarray) -> float:
+            return float(np.linalg.norm(scales * (inverse @ of)))
+
+        while not left(averaged.shot(z + share * change, wave, False)[0]) < (1 - 0.1 * share) * left(off):
             share *= 0.5
             if share < SHORTEST:
                 return None
