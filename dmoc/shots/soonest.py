@@ -171,10 +171,12 @@ def _corrected(
         share = min(1.0, LONGER * z[place] / (abs(change[place]) or 1.0))
 
         # A step is judged by the correction that it leaves (P. Deuflhard, 2004): equations differ in size.
-        def left(of: np.ndarray) -> float:
-            return float(np.linalg.norm(scales * (inverse @ of)))
-
-        while not left(averaged.shot(z + share * change, wave, False)[0]) < (1 - 0.1 * share) * left(off):
+        judged = scales[:, None] * inverse
+        before = np.linalg.norm(judged @ off)
+        while True:
+            after = np.linalg.norm(judged @ averaged.shot(z + share * change, wave, False)[0])
+            if after < (1 - 0.1 * share) * before:
+                break
             share *= 0.5
             if share < SHORTEST:
                 return None
