@@ -94,8 +94,8 @@ MISSIONS = (
     Row(
         "`delta_iii`",
         lambda: gallery("delta_iii"),
-        7529.712294671,
-        "order 8 to 1e-8; Betts (2010) 7529.712",
+        7529.712296,
+        "indirect shooting; Betts (2010) 7529.712",
         ((4, 20), (6, 8), (6, 12), (8, 16)),
         1e-9,
     ),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from html import escape
 
 
 @dataclass(frozen=True)
@@ -50,5 +49,7 @@ class Facts(Mapping[str, Fact]):
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
+        from html import escape
+
         rows = (f"<tr><th>{escape(line)}</th><td>{escape(words)}</td></tr>" for line, words in self.lines())
         return f"<table>{''.join(rows)}</table>"

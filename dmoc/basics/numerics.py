@@ -204,7 +204,8 @@ def columns(function: ca.Function, *given: Any) -> tuple[np.ndarray, ...]:
     """
     inputs = [_of_columns(one, function.numel_in(i)) for i, one in enumerate(given)]
     count = max(map(len, inputs))
-    inputs = [np.ascontiguousarray(np.broadcast_to(one, (count, one.shape[1]))) for one in inputs]
+    inputs = [np.broadcast_to(one, (count, one.shape[1])) if len(one) != count else one for one in inputs]
+    inputs = [np.ascontiguousarray(one) for one in inputs]
     outputs = [np.empty((count, function.nnz_out(i))) for i in range(function.n_out())]
     for first in range(0, count, MOST_COLUMNS):
         part = slice(first, min(first + MOST_COLUMNS, count))

@@ -6,21 +6,24 @@ from typing import Any
 
 from dmoc.basics.unknown import has_unknown
 from dmoc.configurations.base import Configuration, Translation
-from dmoc.configurations.gyrostat import Gyrostat
-from dmoc.configurations.linked import Linked
-from dmoc.configurations.many import Many
 from dmoc.configurations.rigid import Moments, RigidBody
 
 
 def configuration_of(problem: Any) -> Configuration:
     """The configuration of a transfer problem's body."""
     free = free_configuration(problem)
-    return Linked(free, problem.links) if problem.links else free
+    if not problem.links:
+        return free
+    from dmoc.configurations.linked import Linked
+
+    return Linked(free, problem.links)
 
 
 def free_configuration(problem: Any) -> Configuration:
     """The configuration of the bodies without links."""
     if problem.system is not None:
+        from dmoc.configurations.many import Many
+
         bodies = problem.system.bodies
         parts = tuple(
             Translation(problem.dimension) if body.inertia is None else RigidBody(body.inertia)
@@ -35,7 +38,11 @@ def free_configuration(problem: Any) -> Configuration:
     of_body = problem.inertia, problem.dimension if problem.start.has_position else 0, start_mass
     constant = actuator.burns and actuator.inertia_law == "constant"
     wheels = actuator.wheel_axes
-    return Gyrostat(*of_body, constant, wheels) if wheels else RigidBody(*of_body, constant)
+    if not wheels:
+        return RigidBody(*of_body, constant)
+    from dmoc.configurations.gyrostat import Gyrostat
+
+    return Gyrostat(*of_body, constant, wheels)
 
 
 def unknown_parts(problem: Any) -> list[Any]:

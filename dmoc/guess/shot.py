@@ -11,9 +11,6 @@ from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions, step_nodes
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.problem import TransferProblem
-from dmoc.shots.extremal import least_effort
-from dmoc.shots.flyby import least_effort_past
-from dmoc.shots.soonest import least_time
 
 # A likely duration is so many times that which full thrust throughout takes [-].
 LIKELY = 1.2
@@ -49,6 +46,8 @@ def soonest_to_orbit(
     full = problem.objective.hurries and problem.actuator.throughout is not None
     if not (full and _shoots(problem) and _very_many_turns(problem, duration)):
         return None
+    from dmoc.shots.soonest import least_time
+
     found = least_time(problem, start)
     if found is None or not shortest <= found[0] <= longest:
         return None
@@ -92,7 +91,11 @@ def least_effort_to_orbit(
     problem: TransferProblem, mesh: np.ndarray, order: int, hold: bool, duration: float
 ) -> DiscretePath | None:
     """The path of least effort from a known state to an open place on an orbit; None if none is found."""
-    path = least_effort(problem, duration, problem.start.fixed()) if _shoots(problem) else None
+    if not _shoots(problem):
+        return None
+    from dmoc.shots.extremal import least_effort
+
+    path = least_effort(problem, duration, problem.start.fixed())
     return None if path is None else _flown(problem, mesh, order, hold, duration, path)
 
 
@@ -122,6 +125,8 @@ def past_attractors(
     several = len(attraction.sources) > 1 and problem.dimension > 1
     if not several or problem.free_duration or np.isnan(states).any():
         return None
+    from dmoc.shots.flyby import least_effort_past
+
     path = least_effort_past(problem, duration, states)
     if path is None:
         return None

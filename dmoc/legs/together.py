@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -17,6 +17,9 @@ from dmoc.basics.docstrings import Duties
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import KeepOut
 from dmoc.parts.rows import Row
+
+# Two bodies change their frame at one time if the times differ by less than this part of them [-].
+SAME = 1e-9
 
 
 class Together(Duties):
@@ -173,6 +176,47 @@ class Meet(Together):
 
     def words(self) -> str:
         return f"{self.who} meet at the end" + (" with one velocity" if self.velocity else "")
+
+
+class Frames(NamedTuple):
+    """The frames that a body changes to on its way, in turn, and the time of each since the start [s].
+
+    A time is NaN where it is not stated.
+    """
+
+    events: tuple[Any, ...] = ()
+    times: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, body: Any) -> Frames:
+        """Those of a transfer or a mission."""
+        if not hasattr(body, "joints"):
+            return cls()
+        spans = [leg.duration_bounds for leg in body.stretches]
+        *fixed, whole = [low if low == high else np.nan for low, high in (*spans, body.duration_bounds)]
+        ahead = np.cumsum([0.0, *fixed])
+        behind = whole - np.cumsum([0.0, *fixed[::-1]])[::-1]
+        times = np.where(np.isnan(ahead), behind, ahead)
+        found = [
+            (event, float(time))
+            for joint, time in zip(body.joints, times, strict=True)
+            for event in joint.events
+            if event.changes_frame
+        ]
+        return cls(*map(tuple, zip(*found, strict=True))) if found else cls()
+
+    def differ(self, other: Frames, all_along: bool) -> str:
+        """In words, why two bodies are not in one frame at the end, or `all_along`; empty if they are."""
+        if self.events != other.events:
+            return "they do not change to the same frames in the same order"
+        late = np.abs(np.subtract(self.times, other.times)) if all_along else np.empty(0)
+        if np.isnan(late).any():
+            return (
+                "they change their frame at a time that is not stated; give the legs before it fixed durations"
+            )
+        if (late > SAME * np.maximum(self.times, 1.0)).any():
+            return f"they change their frame {late.max():g} s apart; change the durations of the legs before it"
+        return ""
 
 
 def _names(owner: str, value: Any) -> tuple[str, ...]:

@@ -135,9 +135,9 @@ def first_path(
 
 def _unstable_angle(problem: TransferProblem, guess: DiscretePath) -> float:
     """The angle [rad] of a linear motion on which the steps of a guess are unstable; else 0."""
-    dynamics, longest = Dynamics.of(problem), problem.duration_bounds[1]
-    stable, angle = stable_from(dynamics, guess, problem.start_time, longest)
-    return angle if stable > len(guess.mesh) - 1 else 0.0
+    dynamics, longest, steps = Dynamics.of(problem), problem.duration_bounds[1], len(guess.mesh) - 1
+    stable, angle = stable_from(dynamics, guess, problem.start_time, longest, steps)
+    return angle if stable > steps else 0.0
 
 
 def trial_path(

@@ -83,10 +83,11 @@ class Whole:
         self.slope = slope * scales / program.cost + lam_x
         self.rows = self.rows * row_scales
         self.lam_x, self.lam_g = lam_x, lam_g
+        self.bounds = program.bounds()
 
     def joints(self) -> Check:
         """States, times and masses beside each joint, and the conditions of start, goal and events."""
-        lbx, ubx, low, high = self.program.bounds()
+        lbx, ubx, low, high = self.bounds
         first, last = self.program.first_row, self.program.first_row + self.program.joint_rows
         excess = np.maximum(low - self.rows, self.rows - high)[first:last]
         outside = np.maximum(lbx - self.x, self.x - ubx)
@@ -104,7 +105,7 @@ class Whole:
         share = share_of(self.solution.parts, self.solution.objective)
         if share > WORTH:
             return Check.of("optimality", share, WORTH, "of the objective", told(share))
-        program, (lbx, ubx, lbg, ubg) = self.program, self.program.bounds()
+        program, (lbx, ubx, lbg, ubg) = self.program, self.bounds
         found = []
         for placed in program.legs:
             one = placed.program

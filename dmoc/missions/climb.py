@@ -58,8 +58,9 @@ class Climb:
     sharp = False
     # How near attempts from nearly the answer stay to it.
     staying = STAYING
-    # Meshes are refined until there was so much work.
-    most_work = np.inf
+    # So many meshes are refined to a tolerance, until so much work, and each in at most so many iterations.
+    most_meshes, most_work = MOST_MESHES, np.inf
+    most_finer: int | None = None
     # `near` for finer meshes where the cost hardly depends on where legs end: they begin without multipliers.
     valley: tuple[float, float] | None = None
 
@@ -230,7 +231,7 @@ class Climb:
         """
         error: Error | None = None
         changes: list[float] = []
-        for _ in range(MOST_MENDED if tol is None and np.isinf(still) else MOST_MESHES):
+        for _ in range(MOST_MENDED if tol is None and np.isinf(still) else self.most_meshes):
             rest = left_after(changes) if changes else 0.0 if seen else np.inf
             if tol is None and attempt.largest_error <= accurate and rest <= still:
                 break
@@ -238,7 +239,7 @@ class Climb:
             onto = attempt.path.finer(attempt.to_cut(tol or accurate, self.sharp, tol is not None))
             if sum(len(leg.mesh) - 1 for leg in onto.legs) > MOST_STEPS or self.work > self.most_work:
                 break
-            found = self.on_finer(onto)
+            found = self.on_finer(onto, self.most_finer)
             if found.answer.status == "stopped":
                 return found, error, False
             if not found.solved:

@@ -43,8 +43,6 @@ SLOWEST = 0.02
 COUNTED = 300
 # A step whose h omega is below this is stable by far at any order: nothing is computed before the solve.
 HARMLESS = 0.5
-
-
 # What finds a mesh that is fine enough for the checks, too.
 OPEN = "--tol 1e-4 (in Python tol=1e-4) finds as many as the accuracy needs"
 # A guess may turn a body by this angle in a step of each order [rad]: beyond it the scheme has solutions of its
@@ -238,18 +236,18 @@ def refuse_unstable(
 
 
 def stable_from(
-    dynamics: Dynamics, guess: DiscretePath, start_time: float, duration: float
+    dynamics: Dynamics, guess: DiscretePath, start_time: float, duration: float, steps: int = 1
 ) -> tuple[int, float]:
     """From how many equal steps on a scheme is stable, and the angle [rad] of the fastest motion in that time.
 
-    Both are 0 where they are not known before the solve.
+    Both are 0 where they are not known before the solve, or where so many `steps` are harmless.
     """
-    tried = _constant_growth(dynamics, guess, start_time, np.array([duration]), np.ones(1))
+    tried = _constant_growth(dynamics, guess, start_time, np.array([duration / steps]), np.array([steps]))
     if tried is None:
         return 0, 0.0
     # The number of steps is at least h omega over that of the slowest growth that is looked at.
-    counts = np.geomspace(1.0, max(tried[1][0] / SLOWEST, 2.0), COUNTED)
-    last = 0.0
+    last, angle = 0.0, steps * float(tried[1][0])
+    counts = np.geomspace(1.0, max(angle / SLOWEST, 2.0), COUNTED)
     for _ in range(2):
         counts = np.unique(np.ceil(counts))
         found = _constant_growth(dynamics, guess, start_time, duration / counts, counts)
@@ -258,7 +256,7 @@ def stable_from(
             break
         last, above = counts[unstable[-1]], counts[min(unstable[-1] + 1, len(counts) - 1)]
         counts = np.linspace(last, above, COUNTED)
-    return int(last) + 1, float(tried[1][0])
+    return int(last) + 1, angle
 
 
 def _constant_growth(

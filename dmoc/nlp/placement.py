@@ -133,7 +133,8 @@ class Placement:
 
         def stacked(layout: Layout, places: Sequence[tuple[str, slice]]) -> np.ndarray:
             found = [layout[group].indices[:, at] for group, at in places]
-            return np.vstack([np.broadcast_to(each, (len(each), count)) for each in found])
+            wide = [np.broadcast_to(one, (len(one), count)) if one.shape[1] != count else one for one in found]
+            return np.vstack(wide)
 
         values = [numbers[name][at] for name, at in stencil.numbers]
         return Block(

@@ -24,8 +24,6 @@ from dmoc.reports.ends import (
     start_words,
 )
 from dmoc.reports.layout import console, effect_words, pairs, plain_table, value_words
-from dmoc.reports.missions import legs_table, mission_scene
-from dmoc.reports.teams import bodies_table, team_scene
 from dmoc.reports.verdict import verdict_words
 
 if TYPE_CHECKING:
@@ -43,8 +41,12 @@ REDRAW = 0.1
 def scene(problem: TransferProblem) -> RenderableType:
     """What is to be done, in words."""
     if hasattr(problem, "plan"):
+        from dmoc.reports.missions import mission_scene
+
         return mission_scene(problem)  # type: ignore[arg-type]
     if hasattr(problem, "together"):
+        from dmoc.reports.teams import team_scene
+
         return team_scene(problem, scene)
     shortest, longest = problem.duration_bounds
     free = f"free between {lasting(shortest, 6)} and {lasting(longest, 6)}"
@@ -233,9 +235,13 @@ def live_line(unit: str) -> Iterator[Callable | None]:
 def _legs(solution: Any) -> list[RenderableType]:
     """The legs and impulses of a mission, or the bodies of a team; nothing of a transfer."""
     if hasattr(solution, "members"):
+        from dmoc.reports.teams import bodies_table
+
         return [bodies_table(solution), Text()]
     if not hasattr(solution, "impulses"):
         return []
+    from dmoc.reports.missions import legs_table
+
     return [legs_table(solution), Text()]
 
 

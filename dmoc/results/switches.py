@@ -58,9 +58,14 @@ def burns_unpaid(problem: TransferProblem) -> bool:
 
 def linear_controls(problem: TransferProblem) -> np.ndarray:
     """Which controls the cost is linear in, whether or not each has limits of its own."""
-    u = ca.SX.sym("u", problem.controls)
-    curved = ca.sum2(ca.hessian(_rate(problem, u), u)[0])
-    return np.array([not curved.sparsity().has_nz(i, 0) for i in range(problem.controls)])
+
+    def found() -> tuple[bool, ...]:
+        u = ca.SX.sym("u", problem.controls)
+        curved = ca.sum2(ca.hessian(_rate(problem, u), u)[0])
+        return tuple(not curved.sparsity().has_nz(i, 0) for i in range(problem.controls))
+
+    parts = problem.actuator, problem.objective, problem.dimension, problem.controls
+    return np.array(remembered(found, "linear controls", *parts))
 
 
 def switch_times(problem: TransferProblem, path: DiscretePath) -> np.ndarray:

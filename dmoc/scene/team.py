@@ -10,7 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, short
 from dmoc.basics.docstrings import Named
-from dmoc.legs.together import Together
+from dmoc.legs.together import Frames, Together
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import snake
 from dmoc.scene.mission import Mission
@@ -77,6 +77,7 @@ class Team(Named):
             self._check_durations()
         for part in self.together:
             self._check_between(part)
+        self._check_frames()
         self._check_ends()
 
     @property
@@ -198,6 +199,15 @@ class Team(Named):
                     f"{type(part).__name__}: no body is called {name!r}; there are {', '.join(self.names)}"
                 )
 
+    def _check_frames(self) -> None:
+        """Distances are those in one frame: who keeps one, or meets, is in the same frame as the other."""
+        frames = [Frames.of(one) for one in self.members]
+        for part, a, b in self.pairs():
+            if why := frames[a].differ(frames[b], all_along=part.distance_kept > 0):
+                what = "keep a distance" if part.distance_kept else "meet"
+                both = f"{self.names[a]} and {self.names[b]}"
+                raise ValueError(f"{both} are to {what}, which is counted in one frame, but {why}")
+
     def _check_ends(self) -> None:
         """Ends that are fixed can neither be moved apart nor together."""
         for part, a, b in self.pairs():
@@ -251,14 +261,7 @@ def _turns_at_goal(one: Any) -> bool:
 
 def _member(index: int, given: Any) -> Any:
     one = getattr(given, "alone", None) or given
-    if hasattr(one, "joints"):
-        for event in (event for joint in one.joints for event in joint.events):
-            if event.changes_frame:
-                raise ValueError(
-                    f"members[{index}] changes its frame on the way ({event.words()}), and distances are those "
-                    "in one frame: state all of its legs in the frame of the others"
-                )
-    elif not isinstance(one, TransferProblem):
+    if not hasattr(one, "joints") and not isinstance(one, TransferProblem):
         raise ValueError(f"members[{index}] must be a dmoc.TransferProblem or Mission; got {short(given)}")
     if one.objective.learns:
         raise ValueError(f"members[{index}] has Information as its objective, which is one of a transfer alone")

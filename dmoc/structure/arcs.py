@@ -15,8 +15,18 @@ from dmoc.motion.path import DiscretePath
 from dmoc.results.solution import Solution
 from dmoc.results.switches import control_shares
 from dmoc.scene.problem import TransferProblem
-from dmoc.structure.modes import FREE, INSIDE, SINGULAR_NODES, kinds_along, names_of, runs_of, switch
-from dmoc.structure.speeds import sped
+from dmoc.structure.modes import (
+    FREE,
+    FULL,
+    INSIDE,
+    SINGULAR_NODES,
+    kinds_along,
+    names_of,
+    runs_of,
+    switch,
+    turned_round,
+)
+from dmoc.structure.speeds import beside, sped
 from dmoc.structure.surfaces import Surface, touched
 
 # What the controls do in an arc.
@@ -34,8 +44,6 @@ FOLLOWED_STEPS = 2.5
 MOST_TURNS = 10
 # An arc is clearly there if it is longer than so many times the way from one node to the next [-].
 CLEAR = 3.0
-# A switch within so many steps from where a limit on the speed is reached or left is there.
-BESIDE = 2.0
 
 
 class Arc(NamedTuple):
@@ -86,6 +94,7 @@ def arcs_of(solution: Solution) -> tuple[Arc, ...]:
     """The arcs of an answer on a coarse mesh."""
     problem, path = solution.require_problem(), solution.path
     cuts = _switches(problem, path) if is_switched(problem) else _limits_kept(solution)
+    cuts = turned_round(problem, path, cuts, (BURN, FULL))
     marks: list[tuple[float, float, Surface]] = []
     least, step = ACTS * abs(solution.objective), 1.0 / (len(path.mesh) - 1)
     for surface, acts in touched(problem, path, least).items():
@@ -95,17 +104,7 @@ def arcs_of(solution: Solution) -> tuple[Arc, ...]:
         marks += [(*span, surface) for span in spans]
     kept = sped(problem, path, least)
     along = [(*span, surface) for surface, acts in kept.items() for span in spans_of(path, acts)]
-    return _merged(_beside(cuts, along, step), sorted([*marks, *along]), step, kept)
-
-
-def _beside(cuts: list, along: list[tuple[float, float, Surface]], step: float) -> list[tuple[str, float]]:
-    """Switches; those next to where a limit on the speed is reached or left are there."""
-    ends = np.array([end for first, last, _ in along for end in (first, last)])
-    found = []
-    for kind, end in cuts:
-        near = ends[np.abs(ends - end) < BESIDE * step]
-        found.append((kind, float(near[0]) if len(near) and end < 1.0 else end))
-    return found
+    return _merged(beside(cuts, along, step), sorted([*marks, *along]), step, kept)
 
 
 def _switches(problem: TransferProblem, path: DiscretePath) -> list[tuple[str, float]]:

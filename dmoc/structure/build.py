@@ -20,7 +20,15 @@ from dmoc.results.switches import linear_controls
 from dmoc.scene.mission import LEAST_SHARE, Mission
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc
-from dmoc.structure.modes import are_rows, continued, controls_at_limits, is_linear, names_of, sides_of
+from dmoc.structure.modes import (
+    REVERSED,
+    are_rows,
+    continued,
+    controls_at_limits,
+    is_linear,
+    names_of,
+    sides_of,
+)
 from dmoc.structure.speeds import held, is_of_speed
 from dmoc.structure.surfaces import Followed, Tangent
 
@@ -34,6 +42,8 @@ LEAST_STEPS = 2
 SINGULAR_DEGREE = 6
 # A leg of a guess lasts at least this part of the whole duration [-].
 LEAST_GUESSED = 2e-3
+# Forces at neighbouring nodes of an arc that is turned round have at least this cosine in a guess [-].
+ALIKE = 0.5
 # The angle around attractors is summed up over this many places of a leg.
 SAMPLES = 200
 
@@ -75,7 +85,7 @@ def _leg(problem: TransferProblem, arc: Arc, index: int) -> Leg:
         constraints = tuple(parts)
     if arc.kind == COAST:
         return Coast(constraints=constraints, name=name)
-    if arc.kind == BURN:
+    if arc.kind.startswith(BURN):
         engine: Any = problem.actuator
         return Leg(actuator=replace(engine, min_thrust=engine.max_thrust), constraints=constraints, name=name)
     # Where a speed is kept to along a line, that says what the control is; in a plane it may turn, and where no
@@ -153,7 +163,7 @@ class Course:
             return np.zeros((len(at), 0))
         control = np.stack([np.interp(at, self.times, column) for column in self.control.T], axis=1)
         primer = np.stack([np.interp(at, self.times, column) for column in self.costate.T], axis=1)
-        if kind != BURN:
+        if not kind.startswith(BURN):
             return controls_at_limits(problem, kind, control, primer)
         upper = problem.actuator.bounds(problem.dimension)[1]
         if problem.actuator.smoothing is None:
@@ -161,6 +171,22 @@ class Course:
         # A thrust of least cost is against the costate, also where the coarse answer coasts.
         primer = -primer / np.maximum(np.linalg.norm(primer, axis=1), 1e-300)[:, None]
         return np.hstack([upper[-1] * primer, np.full((len(at), 1), upper[-1])])
+
+
+def with_one_way(path: DiscretePath, axes: int) -> DiscretePath:
+    """The path of an arc whose force hardly turns from node to node: where it does, that is as it was before.
+
+    An arc ends where its force is turned round. There the costate is nearly none, and a node whose force is
+    against the others is an optimum of its own.
+    """
+    control, middle = path.control.copy(), len(path.control) // 2
+    force = control[:, :axes]
+    for nodes, back in ((range(middle + 1, len(force)), 1), (range(middle - 1, -1, -1), -1)):
+        for node in nodes:
+            before = force[node - back]
+            if force[node] @ before < ALIKE * np.linalg.norm(force[node]) * np.linalg.norm(before):
+                force[node] = before
+    return replace(path, control=control)
 
 
 def path_of(
@@ -175,6 +201,8 @@ def path_of(
         course.leg(problem, arc.kind, (begin, end), order)
         for arc, begin, end in zip(arcs, begins, ends, strict=True)
     ]
+    if any(REVERSED in arc.kind for arc in arcs):
+        paths = [with_one_way(path, problem.dimension) for path in paths]
     return MissionPath(tuple(paths), tuple(map(float, begins)))
 
 

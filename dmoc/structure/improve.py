@@ -11,7 +11,7 @@ from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.scene.problem import TransferProblem
 from dmoc.structure.arcs import ACTS, BURN, COAST, PARTLY, Arc, is_switched, joined, spans_of
-from dmoc.structure.modes import lacking, names_of
+from dmoc.structure.modes import AND, REVERSED, lacking, names_of
 from dmoc.structure.speeds import is_of_speed, sped
 from dmoc.structure.surfaces import NEAR, pierced, pulled, room, touched
 
@@ -80,6 +80,12 @@ def _other_limits(
     parts = _parted(arcs, index, found, wrong, kind)
     scaled = [part._replace(end=begin + (arcs[index].end - begin) * part.end) for part in parts]
     return (*arcs[:index], *scaled, *arcs[index + 1 :])
+
+
+def not_turned_round(arcs: tuple[Arc, ...]) -> tuple[Arc, ...]:
+    """The arcs without joints at which a full force is turned round; the same if there are none."""
+    plain = tuple(arc._replace(kind=arc.kind.removesuffix(AND + REVERSED)) for arc in arcs)
+    return arcs if plain == arcs else joined(plain)
 
 
 def is_pulled(arcs: Sequence[Arc], found: MissionSolution) -> bool:

@@ -12,11 +12,16 @@ import numpy as np
 
 from dmoc.legs.events import Event, Instant, Passed
 from dmoc.motion.path import ACTUATOR_ROWS, DiscretePath, Key
-from dmoc.results.switches import linear_controls
+from dmoc.results.switches import burns_unpaid, linear_controls
 from dmoc.scene.problem import TransferProblem
 
 # An arc in which no limit is kept to.
 FREE = "arc"
+# An arc of the largest force. Behind a joint where that is turned round its kind has the other word, too.
+FULL, REVERSED = "full force", "reversed"
+# The largest force is turned round within two gaps between nodes if its directions there have at most this
+# cosine [-].
+OPPOSED = -0.9
 # Words for the limits that are kept to in one arc are joined by this one.
 AND = " and "
 # The multipliers of the limits of controls have this key.
@@ -214,6 +219,35 @@ def _instead(name: tuple[str, str], side: int, push: float, problem: TransferPro
     if side == 0:
         return int(np.sign(push))
     return -side if is_linear(problem)[limit] and all(name) else 0
+
+
+def turned_round(
+    problem: TransferProblem, path: DiscretePath, cuts: list[tuple[str, float]], full: Sequence[str]
+) -> list[tuple[str, float]]:
+    """Kinds of arcs and their ends, with those of `full` force cut where that is turned round, if it is unpaid.
+
+    Between states at rest, say, the costate passes through nothing: the direction jumps, which no step follows.
+    """
+    force, at, limit = path.control[:, : problem.dimension], path.fractions, problem.actuator.force_limit()
+    ball = bool(names_of(problem)) and are_rows(problem) and bool(linear_controls(problem).all())
+    if limit is None or problem.dimension < 2 or not (ball or burns_unpaid(problem)):
+        return cuts
+    nodes = np.flatnonzero(np.linalg.norm(force, axis=1) > 0.5 * limit)
+    ways = force[nodes] / np.linalg.norm(force[nodes], axis=1)[:, None]
+    middles: list[float] = []
+    for apart in (1, 2):
+        for i in np.flatnonzero((ways[apart:] * ways[:-apart]).sum(axis=1) < OPPOSED):
+            first, last = at[nodes[i]], at[nodes[i + apart]]
+            if not any(first < middle < last for middle in middles):
+                middles.append(float(0.5 * (first + last)))
+    found, begin, back = [], 0.0, False
+    for kind, end in cuts:
+        inside = [middle for middle in sorted(middles) if begin < middle < end and kind in full]
+        for last in [*inside, end]:
+            found.append((kind + AND + REVERSED if back and kind in full else kind, last))
+            back ^= last != end
+        begin, back = end, back and kind in full
+    return found
 
 
 def runs_of(kinds: np.ndarray) -> list[int]:

@@ -13,7 +13,7 @@ from dmoc.checks.verification import Report
 from dmoc.missions.answer import answered
 from dmoc.missions.attempt import Attempt
 from dmoc.missions.checks import verify_mission
-from dmoc.missions.climb import NEARER, STAYING, Climb
+from dmoc.missions.climb import MOST_MESHES, NEARER, STAYING, Climb
 from dmoc.missions.solution import MissionSolution
 from dmoc.results.solution import Solution
 from dmoc.rungs.rung import cut_short
@@ -33,8 +33,8 @@ from dmoc.structure.arcs import (
 )
 from dmoc.structure.build import FOUND_ORDER, ORDER, Course, mission_of, path_of
 from dmoc.structure.coarse import ENDED, LESS_ROUNDED, ROUNDED, coarse_answer
-from dmoc.structure.improve import improved, is_pulled
-from dmoc.structure.modes import FREE
+from dmoc.structure.improve import improved, is_pulled, not_turned_round
+from dmoc.structure.modes import FREE, REVERSED
 from dmoc.structure.solution import structured
 
 # A second coarse answer has so many times the steps.
@@ -57,6 +57,8 @@ SAME_COST = 1e-3
 # An attempt from nearly the answer ends after this many iterations, on arcs of a second coarse answer after
 # that many.
 MOST_ITERATIONS, PATIENT = 100, 250
+# Legs between which the force is turned round are right on fewer meshes than this, or it turns fast instead.
+FEW_MESHES = 4
 # Finding the legs takes at most this much work, iterations times steps, beside so many times that of the coarse
 # answer: about two seconds. Where they are not found by then the ordinary ladder goes on.
 MOST_WORK, MOST_TIMES = 20_000, 2
@@ -139,9 +141,12 @@ def _by_arcs(
     numerics = more.get("options"), more.get("progress"), bool(more.get("compiled")), more.get("time_limit")
     # To wait at either end may cost nothing: of legs that may last as long as they like Ipopt finds no optimum.
     moving = without_waiting(arcs) if problem.free_duration and not problem.goal.anchored else arcs
-    for these, dearer in ((arcs, np.inf), (moving, SAME_COST))[: 1 if moving == arcs else 2]:
+    tried = {arcs: np.inf, not_turned_round(arcs): np.inf}
+    tried.setdefault(moving, SAME_COST)
+    for these, dearer in tried.items():
         climb = Climb(mission_of(problem, these), *numerics)
         climb.sharp, climb.staying = True, NEARER if most > MOST_ITERATIONS else STAYING
+        climb.most_finer = MOST_ITERATIONS
         climb.levels.extend(coarse.ladder)
         with climb.interrupt:
             found = _improved(climb, problem, these, (coarse,), tol, most)
@@ -187,6 +192,9 @@ def _improved(
     most = MOST_WORK + MOST_TIMES * spent
     if tol is None:
         climb.most_work = spent + most
+    # Where the force is turned round at once nothing is left for many meshes; where it turns fast there is.
+    turned = any(REVERSED in arc.kind for arc in arcs)
+    climb.most_meshes = FEW_MESHES if turned else MOST_MESHES
     for _ in range(MOST_ROUNDS):
         settled = _settled(climb, problem, arcs, legs, (spent + most, iterations))
         if settled is None:
@@ -200,7 +208,13 @@ def _improved(
             # What meshes of low order do not show may be seen now, and is, before they are refined.
             arcs = known if attempt is first else improved(problem, known, found)
             if alike(arcs, known):
+                before = len(climb.levels)
                 last, error, met = climb.refined(attempt, tol, ACCURATE, STILL, seen)
+                if turned and len(climb.levels) >= before + FEW_MESHES:
+                    return None
+                if attempt is not first and climb.levels[-1].status == "iteration limit":
+                    # Along limits controls of high order may hardly be determined: those of low order are.
+                    last, error, met = climb.refined(first, tol, ACCURATE, STILL, seen)
                 found = answered(climb, last, error, met, tol)
                 arcs = improved(problem, known, found) if found.optimal and last is not attempt else arcs
         legs = found.legs

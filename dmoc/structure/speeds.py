@@ -20,6 +20,8 @@ from dmoc.structure.surfaces import Surface
 
 # A limit acts at points whose multiplier is more than this part of the largest one [-].
 PUSHES = 1e-2
+# A switch within so many steps from where such a limit is reached or left is there.
+BESIDE = 2.0
 
 
 def is_of_speed(problem: TransferProblem | Mission, surface: Surface | None) -> bool:
@@ -46,6 +48,16 @@ def sped(problem: TransferProblem, path: DiscretePath, least: float) -> dict[Sur
             nodes[step * degree : (step + 1) * degree + 1] = True
         if nodes.any():
             found[Surface(i, 0, upper=True)] = nodes
+    return found
+
+
+def beside(cuts: list, along: list[tuple[float, float, Surface]], step: float) -> list[tuple[str, float]]:
+    """Switches; those next to where a limit on the speed is reached or left are there."""
+    ends = np.array([end for first, last, _ in along for end in (first, last)])
+    found = []
+    for kind, end in cuts:
+        near = ends[np.abs(ends - end) < BESIDE * step]
+        found.append((kind, float(near[0]) if len(near) and end < 1.0 else end))
     return found
 
 

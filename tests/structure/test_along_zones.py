@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 import dmoc
-from dmoc import Engine, Fuel, KeepOut, State, TransferProblem
+from dmoc import BallForce, Engine, Fuel, KeepOut, SpeedLimit, State, TransferProblem
 from dmoc.structure.arcs import BURN, COAST, PARTLY, from_plain
 from dmoc.structure.improve import is_pulled
 
@@ -93,3 +93,22 @@ def test_a_path_that_a_zone_would_have_to_hold_is_no_answer():
     rows = next(key for key in found.legs[at].path.multipliers if key.group.startswith("followed"))
     found.legs[at].path.multipliers[rows] *= -1
     assert is_pulled(arcs, found)
+
+
+@pytest.mark.slow
+def test_legs_of_low_order_where_those_of_high_order_hardly_end():
+    """On a short way along the zone, at the speed limit, controls of order 8 took 700 iterations and no end."""
+    scene = TransferProblem(
+        1.0,
+        State((0.0, 0.0), (0.0, 0.0)),
+        State((6.0, 0.0), (0.0, 0.0)),
+        12.93753991055913,
+        constraints=[
+            KeepOut((3.365339008998263, 0.42579960971980524), 0.8509550226169329),
+            SpeedLimit(0.6667383000416803),
+        ],
+        actuator=BallForce(0.21056085624188467),
+    )
+    found = dmoc.solve(scene, 6, 24, structure=True)
+    assert len(found.legs) == 6 and found.success and dmoc.verify(found).ok
+    assert found.objective == pytest.approx(0.10869572, rel=1e-6)

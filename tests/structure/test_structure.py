@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import dmoc
 from dmoc import (
@@ -459,3 +460,33 @@ def test_controls_of_a_leg_as_one_polynomial():
     assert found.success and leg.control == pytest.approx(line, abs=1e-9)
     with pytest.raises(ValueError, match="control_degree"):
         Leg(1.0, control_degree=-1)
+
+
+def test_a_full_force_that_is_turned_round_in_the_plane():
+    """Between states on one line the direction jumps: the closed form, from meshes that have no node there."""
+    distance, speed = 10**0.5, 0.1**0.5
+    ends = State((0.0, 0.0), (0.3, 0.1)), State((3.0, 1.0), (0.0, 0.0))
+    scene = TransferProblem(1.0, *ends, (0.1, 30.0), actuator=BallForce(1.0), objective=Time())
+    found = dmoc.solve(scene, structure=True)
+    assert kinds(found) == ["full force", "full force and reversed"] and dmoc.verify(found).ok
+    assert found.objective == pytest.approx(2 * (distance + 0.5 * speed**2) ** 0.5 - speed, rel=1e-9)
+
+
+def test_an_engine_that_burns_all_the_way_and_turns_round():
+    """Its mass burns away, so that no mesh has the node where it turns: Tsiolkovsky's equation twice."""
+    thrust, exhaust, distance = 3.0, 20.0, 5**0.5
+    flow = thrust / exhaust
+
+    def beyond(turned):
+        first = 1 - turned * (1 - np.log(turned))
+        second = [mass * (np.log(mass) - 1 - 2 * np.log(turned)) for mass in (turned**2, turned)]
+        return exhaust / flow * (first + second[1] - second[0]) - distance
+
+    ends = State((0.0, 0.0), (0.0, 0.0)), State((2.0, 1.0), (0.0, 0.0))
+    engine = Engine(thrust, exhaust_velocity=exhaust)
+    found = dmoc.solve(
+        TransferProblem(1.0, *ends, (1.0, 6.0), actuator=engine, objective=Time()), tol=1e-6, time_limit=30
+    )
+    assert found.success and len(found.legs) == 2 and dmoc.verify(found).ok
+    turned = brentq(beyond, 0.5, 0.999, xtol=1e-14)
+    assert found.objective == pytest.approx((1 - turned**2) / flow, rel=1e-8)
