@@ -58,6 +58,12 @@ class Chart:
         """The direction of the axis in the scene's own axes; none of it lies in a plane scene."""
         return self.normal[: self.axes]
 
+    @property
+    def turns(self) -> float:
+        """How many revolutions the path makes."""
+        cosines = np.sum(self.out[1:] * self.out[:-1], axis=1)
+        return float(np.arccos(np.clip(cosines, -1.0, 1.0)).sum() / (2 * np.pi))
+
     def turning(self, vectors: np.ndarray) -> np.ndarray:
         """The change of vectors, one a node, by a turn around the axis, per radian."""
         full = np.cross(self.normal, np.pad(vectors, ((0, 0), (0, 3 - self.axes))))

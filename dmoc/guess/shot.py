@@ -46,14 +46,9 @@ def soonest_to_orbit(
     full = problem.objective.hurries and problem.actuator.throughout is not None
     if not (full and _shoots(problem) and _very_many_turns(problem, duration)):
         return None
-    from dmoc.shots.soonest import full_controls, least_time
+    from dmoc.shots.soonest import least_time
 
-    duration /= LIKELY
-    if problem.actuator.burns:
-        # The mass burns away on the way: K. E. Tsiolkovsky's equation (1903).
-        burnt = float(problem.actuator.flow(full_controls(problem))) * duration / problem.mass
-        duration *= -np.expm1(-burnt) / burnt
-    found = least_time(problem, float(duration), start)
+    found = least_time(problem, start)
     if found is None or not shortest <= found[0] <= longest:
         return None
     flown = _flown(problem, mesh, order, hold, *found)

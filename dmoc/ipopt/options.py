@@ -91,17 +91,18 @@ def settings_for(
     degree: int,
     warm: bool = False,
     carried: bool = False,
-    curved: bool = False,
+    turned: float = 0.0,
 ) -> dict[str, Any]:
     """Options of Ipopt for a problem on a mesh.
 
     `warm` if multipliers are known, `carried` if they and the path come from the answer on a coarser mesh,
-    `curved` if the unknowns are those of a chart.
+    `turned` are the revolutions of the path whose chart gives the unknowns, 0 without a chart.
     """
+    curved, turns = turned > 0, max(turned, _turns(problem))
     settings: dict[str, Any] = {
         # Limits are kept as they are given: Ipopt would loosen them by 1e-8.
         "ipopt.bound_relax_factor": 0.0,
-        "ipopt.tol": tolerance(mesh, degree, problem.limited, _turns(problem)),
+        "ipopt.tol": tolerance(mesh, degree, problem.limited, turns),
         "ipopt.constr_viol_tol": 1e-6,
         # At some optima the objective does not change in one direction, along which Ipopt would wander on: a
         # run ends after ten iterations without a gain.
@@ -117,7 +118,7 @@ def settings_for(
         problem.limited
         and not warm
         and (curved or problem.actuator.smoothing is None)
-        and _turns(problem) > VERY_MANY_TURNS
+        and turns > VERY_MANY_TURNS
     ):
         # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions,
         # and over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
@@ -156,8 +157,12 @@ def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> 
         settings["ipopt.mumps_scaling"] = 8
         if problem.free_duration and problem.actuator == problem.actuator.throughout:
             # A free duration stands in every row of motion: pivots that are small beside it are delayed, and
-            # three iterations on 700 steps took 49 s, like this 2 s.
-            settings |= {"ipopt.mumps_pivtol": 1e-13, "ipopt.mumps_pivtolmax": 1e-8}
+            # three iterations on 700 steps took 49 s, like this 2 s. From 1e-13 on steps are so wrong that
+            # Ipopt sees negative curvature.
+            settings |= {"ipopt.mumps_pivtol": 1e-9, "ipopt.mumps_pivtolmax": 1e-8}
+            # The guess is the answer but for the mesh, and so are the multipliers that follow from it, however
+            # large: Ipopt would begin with none, and far off.
+            settings["ipopt.constr_mult_init_max"] = 1e10
         elif _meters(problem) and _turns(problem) > VERY_MANY_TURNS:
             # Where thrust is all or nothing pivots are delayed, too: over 200 revolutions the first iteration
             # did not end.

@@ -54,8 +54,8 @@ class NLP(Program):
         limits: dict[str, Any] | None = None,
     ) -> ca.Function:
         """Ipopt for this NLP; `warm` and `carried` as in `settings_for`, `limits` are further settings."""
-        curved = self.chart is not None
-        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried, curved)
+        turned = 0.0 if self.chart is None else self.chart.turns
+        settings = settings_for(self.problem, self.mesh, self.scheme.degree, warm, carried, turned)
         # Rows that hold up to their rounding hold no better: a run that waits for that wanders to its end.
         held = "ipopt.acceptable_constr_viol_tol"
         settings[held] = max(settings[held], self._rounding)

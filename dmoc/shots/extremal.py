@@ -137,12 +137,12 @@ class Shot:
     state_slopes: np.ndarray
     costate_slopes: np.ndarray
 
-    def correction(self, goal: ca.Function, first_across: bool = False) -> tuple[np.ndarray, float, float]:
+    def correction(self, goal: ca.Function) -> tuple[np.ndarray, float, float]:
         """The change of the first costate, the miss of the goal, and the relative slope of the effort along it.
 
         The least effort to a state has the slope -costate and the Hessian -d(costate)/d(state). Of a step
         the part across the goal brings its rows to zero, the part along it goes down that parabola; with
-        the curvature of the goal, once that is near. `first_across` leaves out the part along it until then.
+        the curvature of the goal, once that is near.
         """
         flow = np.linalg.solve(self.state_slopes.T, self.costate_slopes.T).T
         hessian = -0.5 * (flow + flow.T)
@@ -159,8 +159,6 @@ class Shot:
         along = -modes @ (uphill / np.maximum(np.abs(curvature), LEAST_CURVATURE))
         if error < CLOSE:
             along *= min(1.0, LONGEST_STEP / (np.linalg.norm(along) or 1.0))
-        elif first_across:
-            along *= 0.0
         slope = np.linalg.norm(tangents.T @ self.costate) / (np.linalg.norm(self.costate) or 1.0)
         return np.linalg.solve(self.state_slopes, across + tangents @ along), error, float(slope)
 
@@ -212,13 +210,6 @@ def _around_bare_attractor(extremal: Extremal) -> np.ndarray | None:
     return searched(
         replace(extremal, problem=replace(problem, effects=bare)), np.zeros(len(extremal.scales)), False, MET
     )
-
-
-def roughly_least_effort(extremal: Extremal) -> np.ndarray | None:
-    """The costate with which the goal is nearly met at the least effort, whatever the thrust; else None."""
-    begin = _around_bare_attractor(extremal)
-    begin = np.zeros(len(extremal.scales)) if begin is None else begin
-    return searched(extremal, begin, False, ROUGHLY_MET)
 
 
 def searched(extremal: Extremal, costate: np.ndarray, limited: bool, enough: float) -> np.ndarray | None:

@@ -50,12 +50,12 @@ def test_the_guess_over_many_revolutions_is_the_answer_but_for_the_mesh(goal):
     assert solution.success and verify(solution).ok
     assert solution.duration == pytest.approx(edelbaum(problem, 100e3), rel=0.01)
     assert np.linalg.norm(solution.force, axis=1) == pytest.approx(0.4)
-    assert solution.iterations < 20
+    assert solution.iterations < 10
 
 
 def test_the_path_ends_on_the_goal_under_full_force():
     problem = raising(100e3, BallForce(0.4), (3e4, 2e5))
-    _, path = least_time(problem, edelbaum(problem, 100e3), problem.start.fixed())
+    _, path = least_time(problem, problem.start.fixed())
     position, velocity, force, mass = path(np.linspace(0.0, 1.0, 101))
     goal = RADIUS + 100e3
     assert np.linalg.norm(position[-1]) == pytest.approx(goal, rel=2e-6)
@@ -73,6 +73,63 @@ def test_full_force_is_no_answer_where_a_smaller_one_takes_less_time():
     assert not gains_nothing(replace(rung, answer=turned), problem)
 
 
+def circle(radius, tilt=0.9):
+    """A state on a circle around the earth."""
+    speed = math.sqrt(MU / radius)
+    return State((radius, 0, 0), (0, speed * math.cos(tilt), speed * math.sin(tilt)))
+
+
+def periapsis(a, e, tilt=0.5):
+    """The lowest state on an ellipse."""
+    speed = math.sqrt(MU * (1 + e) / (a * (1 - e)))
+    return State((a * (1 - e), 0, 0), (0, speed * math.cos(tilt), speed * math.sin(tilt)))
+
+
+def engine(thrust, specific_impulse=1600.0):
+    return Engine(thrust, specific_impulse=specific_impulse)
+
+
+TILT = math.radians(1.0)
+SCENES = {
+    "flat": (
+        State((7e6, 0), (0, math.sqrt(MU / 7e6))),
+        CircularOrbit(7.4e6, mu=MU),
+        Engine(0.5, exhaust_velocity=3000.0),
+        False,
+    ),
+    "up": (circle(7e6, 0.0), CircularOrbit(7.4e6, mu=MU), Engine(0.5, exhaust_velocity=3000.0), False),
+    "up, a force": (circle(7e6, 0.0), CircularOrbit(7.4e6, mu=MU), BallForce(0.5), False),
+    "up, oblate": (circle(7e6), CircularOrbit(7.4e6, mu=MU), engine(0.5), True),
+    "ten revolutions": (circle(7e6), CircularOrbit(7.3e6, mu=MU), engine(1.5), True),
+    "down": (circle(7.6e6), CircularOrbit(7.2e6, mu=MU), engine(0.5), False),
+    "down, oblate": (circle(7.6e6), Orbit(MU, a=7e6, e=0.0, i=0.9), engine(0.3), True),
+    "plane and up, oblate": (circle(7e6), Orbit(MU, a=7.4e6, e=0.0, i=0.9 + 2 * TILT), engine(0.6), True),
+    "node": (circle(7e6), Orbit(MU, a=7.2e6, e=0.0, i=0.9, raan=TILT), engine(0.5), False),
+    "from an ellipse": (periapsis(8e6, 0.1), CircularOrbit(8e6, mu=MU), engine(0.5), False),
+    "to an ellipse, oblate": (periapsis(8e6, 0.12), Orbit(MU, a=8.4e6, e=0.02, i=0.5), engine(0.8), True),
+    "geostationary": (circle(2.4e7, 0.1), Orbit(MU, a=4.2164e7, e=0.0, i=0.0), engine(0.25, 3000.0), False),
+    "160 revolutions": (circle(7e6), CircularOrbit(7.6e6, mu=MU), engine(0.15), False),
+}
+QUICK = ["flat", "ten revolutions"]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in SCENES]
+)
+def test_the_mean_motion_leads_to_the_least_time(name):
+    """Shots in the fast angle found none of these: the next best guess led nowhere in 40 s."""
+    start, goal, actuator, oblate = SCENES[name]
+    effects = [PointGravity(MU), *[J2(MU, EARTH, 1.08263e-3)] * oblate]
+    # How long it takes is left as open as can be.
+    problem = TransferProblem(500.0, start, goal, (1e3, 2e7), effects, actuator, Time())
+    guessed, _ = least_time(problem, start.fixed())
+    solution = solve(problem)
+    assert solution.success and verify(solution).ok
+    # Of the optima that oblateness makes near each other Ipopt may end at another one.
+    assert solution.duration == pytest.approx(guessed, rel=1e-2)
+    assert solution.iterations <= (30 if name == "geostationary" else 10)
+
+
 @pytest.mark.slow
 def test_eighty_revolutions_around_an_oblate_body_take_seconds():
     """From the least effort in a longer time no answer was found within 100 s."""
@@ -82,4 +139,4 @@ def test_eighty_revolutions_around_an_oblate_body_take_seconds():
     assert solution.success and verify(solution).ok
     # Edelbaum's time with all the mass, of which 1.6 % are burnt.
     assert 0.95 * edelbaum(problem, 500e3) < solution.duration < edelbaum(problem, 500e3)
-    assert solution.iterations < 20
+    assert solution.iterations < 10
