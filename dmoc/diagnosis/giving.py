@@ -71,7 +71,7 @@ class Limits:
     @property
     def looser(self) -> tuple[float, ...]:
         """`LOOSER`; with a limit on the speed nothing but the path that was found leads to the very least."""
-        return LOOSER[1:] if any(part.largest_speed() for part in self.given.constraints) else LOOSER
+        return LOOSER[1:] if any(part.unit == "m/s" for part in self.given.constraints) else LOOSER
 
     def remedies(
         self,

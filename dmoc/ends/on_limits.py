@@ -34,9 +34,9 @@ def refuse_mission_ends(mission: Any, whole: Any) -> None:
     """
     made = free_configuration(whole).coordinates
     for end, at in (("start", 0), ("goal", -1)):
-        own, events = mission.plan[at].constraints, mission.joints[at].events
+        constraints, events = mission.stretches[at].constraints, mission.joints[at].events
         try:
-            _refuse(end, whole, made, mission.constraints if own is None else own, not events)
+            _refuse(end, whole, made, constraints, not events)
         except ValueError as error:
             raise ValueError(f"{mission.leg_names[at]}: {error}") from error
 

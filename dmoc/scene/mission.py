@@ -112,7 +112,6 @@ class Mission(Named):
             if isinstance(part, Event):
                 part.check_dimension(self.dimension)
         self._check_impulses()
-        _ = self.stretches
         refuse_mission_ends(self, self._whole)
         clock_of(self)
 
