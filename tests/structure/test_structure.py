@@ -376,7 +376,7 @@ def test_a_box_has_arcs_by_axis():
 
 
 def test_axes_of_a_box_switch_one_at_a_time():
-    """Each axis has an optimum of its own: one with full force at both ends, and one that is a cubic throughout."""
+    """Each axis has an optimum of its own: one with full force at both ends, the other a cubic throughout."""
     ends = State((0, 0), (0, 0)), State((1.0, 0.5), (0.0, 0.3))
     problem = TransferProblem(1.0, *ends, 2.2, actuator=BoxForce((1.0, 0.6)))
     found = dmoc.solve(problem, 4, 40, structure=True)
