@@ -137,8 +137,7 @@ def _sampled(problem: TransferProblem, dynamics: Dynamics, path: DiscretePath, s
     parts = (len(inside) - 1) // (len(path.position) - 1)
     fractions = np.interp(np.arange(len(inside)) / parts, np.arange(len(path.position)), path.fractions)
     mass = np.interp(fractions, path.fractions, path.mass)
-    time, mass = start_time + path.duration * fractions, np.interp(fractions, path.fractions, path.mass)
-    return _Samples(time, inside, moving, mass)
+    return _Samples(start_time + path.duration * fractions, inside, moving, mass)
 
 
 def _beyond(constraint: Constraint, dynamics: Dynamics, samples: _Samples) -> np.ndarray:
