@@ -169,7 +169,6 @@ def _corrected(
         change, scales = -inverse @ off, np.ones(len(z))
         scales[place] /= z[place]
         share = min(1.0, LONGER * z[place] / (abs(change[place]) or 1.0))
-
         # A step is judged by the correction that it leaves (P. Deuflhard, 2004): equations differ in size.
         judged = scales[:, None] * inverse
         before = np.linalg.norm(judged @ off)
