@@ -1,5 +1,7 @@
 """What a path cuts off its limits between the nodes counts in the error of an answer to a tolerance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,7 @@ from dmoc import (
 )
 from dmoc.meshes.cut_off import cut_off
 from dmoc.motion.dynamics import Dynamics
+from dmoc.motion.path import POSITION_BOUNDS
 
 
 def rest(*place):
@@ -105,3 +108,18 @@ def test_of_a_team_the_distances_count_that_bodies_keep():
     team = Team(members, together=[Apart(1.3494)])
     found, fine = (solve(team, tol=tol, structure=False).raise_for_status() for tol in (1e-3, 1e-6))
     assert 1e-5 < abs(found.objective / fine.objective - 1) <= found.error.objective
+
+
+def test_what_holds_the_ends_of_a_path_is_no_limit():
+    """Bounds on the positions of the ends have multipliers that say what other ends would be worth."""
+    problem, order, steps = SCENES["a wall"]
+    path = solve(problem, order=order, steps=steps).raise_for_status().path
+    outside = path.position.copy()
+    outside[:3, 1] += 0.5
+    path = replace(path, position=outside)
+    dearer = dict(path.multipliers)
+    dearer[POSITION_BOUNDS] = dearer[POSITION_BOUNDS].copy()
+    dearer[POSITION_BOUNDS][[0, -1]] += 100.0
+    dynamics = Dynamics.of(problem)
+    costs = [cut_off(problem, dynamics, one, 0.0).cost for one in (path, replace(path, multipliers=dearer))]
+    assert costs[0] == costs[1]

@@ -63,6 +63,23 @@ def test_the_path_ends_on_the_goal_under_full_force():
     assert np.linalg.norm(force, axis=1) == pytest.approx(0.4) and (mass == 500.0).all()
 
 
+def test_the_path_obeys_the_equations_of_motion_and_burns_on_the_way():
+    """Newton's second law by central differences, at three places."""
+    problem = raising(100e3, Engine(0.4, exhaust_velocity=3000.0), (3e4, 2e5))
+    duration, path = least_time(problem, problem.start.fixed())
+    near = 1.0 / duration
+    for place in (0.2, 0.5, 0.8):
+        position, velocity, force, mass = path(np.array([0.0, place - near, place, place + near]))
+        pull = -MU * position[2] / np.linalg.norm(position[2]) ** 3
+        moved = (position[3] - position[1]) / 2
+        np.testing.assert_allclose(moved, velocity[2], atol=1e-6 * np.linalg.norm(velocity[2]))
+        pushed = (velocity[3] - velocity[1]) / 2 - pull
+        # Over two seconds differences err by a sixth of the square of the angle passed in one.
+        rounding = np.linalg.norm(pull) * MU / np.linalg.norm(position[2]) ** 3 / 6
+        np.testing.assert_allclose(pushed, force[2] / mass[2], atol=2 * rounding)
+        assert mass[2] == pytest.approx(500.0 - 0.4 / 3000.0 * place * duration)
+
+
 def test_full_force_is_no_answer_where_a_smaller_one_takes_less_time():
     """The multipliers of the force held at its limit would push it inwards."""
     problem = raising(100e3, BallForce(0.4), (3e4, 2e5))

@@ -31,7 +31,7 @@ from dmoc.structure import solve as structure
 from dmoc.structure.arcs import BURN, COAST, SINGULAR, Arc, _merged, arcs_of, from_plain, surely_seen
 from dmoc.structure.build import mission_of, path_of
 from dmoc.structure.coarse import coarse_answer
-from dmoc.structure.improve import improved
+from dmoc.structure.improve import improved, not_turned_round
 from dmoc.structure.modes import FREE
 from dmoc.structure.solve import NEAR, solve_by_structure
 from dmoc.structure.surfaces import Surface
@@ -373,6 +373,13 @@ def test_a_box_has_arcs_by_axis():
     assert found.success and kinds(found) == ["+x", "-x"] and found.reason == "2 legs: +x 1 s, -x 1 s"
     assert found.objective == pytest.approx(2.0, rel=1e-14)
     assert dmoc.verify(found).ok
+
+
+def test_joints_at_which_a_force_is_turned_round_can_be_taken_away():
+    arcs = Arc("full force", 0.4), Arc("full force and reversed", 0.7), Arc("arc", 1.0)
+    assert not_turned_round(arcs) == (Arc("full force", 0.7), Arc("arc", 1.0))
+    assert not_turned_round(arcs[1:2]) == (Arc("full force", 0.7),)
+    assert not_turned_round(arcs[2:]) == arcs[2:]
 
 
 def test_axes_of_a_box_switch_one_at_a_time():
