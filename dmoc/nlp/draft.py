@@ -58,7 +58,7 @@ class Draft:
         return pulled(lambda name: self.number(name), self._symbols[0], mu)
 
     def control(self, frame: Any, at: slice = ALL) -> ca.SX:
-        """The controls of a node, whose force is in the frame there; left in it if it acts alike in all frames."""
+        """The controls of a node, whose force is in the frame there; kept in it if it acts alike in all."""
         u, n = self.take("force", self.writer.dynamics.controls, at), self.writer.dynamics.positions
         return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved and not self.writer.alike else u
 
