@@ -165,7 +165,7 @@ def test_rows_and_cost_are_those_of_the_plain_unknowns(problem):
 
 
 def test_only_what_sees_a_direction_is_turned_into_the_axes_of_the_scene():
-    """A force in the frame of its node has one entry a row of motion; one in the scene's axes depends on the angle."""
+    """In the frame of its node a force has one entry a row of motion; in the axes of the scene it has more."""
 
     def entries(problem):
         node = stencils_of(problem, 8, False, curved=True).stencils[0].kernel
