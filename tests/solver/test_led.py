@@ -7,7 +7,7 @@ from dmoc.solver.leapt import LED
 
 
 def test_after_a_failure_among_zones_a_cheaper_way_past_them_is_found():
-    """Way and cost are those that four other meshes of orders 2 to 8 end in; the search for a cause leads to 1.42."""
+    """Four other meshes of orders 2 to 8 end in this cost; the search for a cause leads to 1.42."""
     zones = [((-1.8984, 0.5488), 0.0622), ((-1.0586, 1.2447), 0.2404), ((-1.8687, 0.9112), 0.2544)]
     start, goal = State((-1.2304, 1.7634), (0.2169, -0.4871)), State((-2.3844, 0.1746), (-1.4347, -0.6254))
     problem = TransferProblem(
