@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -242,11 +242,12 @@ class Watch:
         # CasADi holds no reference to its callback: this one lives as long as the run.
         self.follower: Follower | None = None
 
-    def stops(self, at: dict[str, ca.DM]) -> bool:
-        """Whether to stop, after it has told of an iterate."""
+    def stops(self, at: dict[str, Any]) -> bool:
+        """Whether to stop, after it has told of an iterate, whose memory is CasADi's."""
         stop = self.interrupt.seen
         if self.tell is not None:
-            stop |= self.tell(self.iteration, float(at["f"]), np.array(at["x"]), np.array(at["g"]))
+            f, x, g = (np.frombuffer(at[name]).copy() for name in ("f", "x", "g"))
+            stop |= self.tell(self.iteration, float(f[0]), x, g)
         self.iteration += 1
         return stop
 
@@ -285,12 +286,16 @@ class Follower(ca.Callback):
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(self.sizes.get(ca.nlpsol_out(i), self.parameters))
 
-    def eval(self, arguments: list) -> list:
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, given: Sequence, results: Sequence) -> int:
         self.telling = True
         try:
-            return [int(self.watch.stops(dict(zip(ca.nlpsol_out(), arguments, strict=True))))]
+            stop = self.watch.stops(dict(zip(ca.nlpsol_out(), given, strict=True)))
         except BaseException as error:
-            self.watch.error = error
-            return [1]
+            self.watch.error, stop = error, True
         finally:
             self.telling = False
+        np.frombuffer(results[0])[:] = stop
+        return 0
