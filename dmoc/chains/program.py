@@ -19,7 +19,8 @@ from dmoc.chains.path import MissionPath, joint_cost
 from dmoc.chains.whole import WHOLE, put_spans, row_to_drop, whole_rows, with_rows
 from dmoc.chains.within import Placed, leg_program, open_leg, polynomial_block, polynomial_rows
 from dmoc.ipopt.options import NEAR, rounding, settings_for
-from dmoc.ipopt.run import Answer, Watch, make_solver, run
+from dmoc.ipopt.run import Answer, make_solver, run
+from dmoc.ipopt.watch import Watch
 from dmoc.nlp.layout import LEG_START, Layout
 from dmoc.nlp.transcription import MOST_HELD_NODES
 from dmoc.nlp.units import Units, units_of

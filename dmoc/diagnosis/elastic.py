@@ -10,7 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from dmoc.ipopt.run import ALWAYS, Follower, Interrupt, Watch, run
+from dmoc.ipopt.run import ALWAYS, run
+from dmoc.ipopt.watch import Follower, Interrupt, Watch
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.results.facts import Level

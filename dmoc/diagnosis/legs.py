@@ -18,7 +18,8 @@ from dmoc.basics.digits import up
 from dmoc.diagnosis.cause import MOST_NAMED, NAMED_SHARE
 from dmoc.diagnosis.elastic import MET, Relaxation, Relaxed
 from dmoc.diagnosis.giving import ROOM, Limits
-from dmoc.ipopt.run import Answer, Interrupt
+from dmoc.ipopt.run import Answer
+from dmoc.ipopt.watch import Interrupt
 from dmoc.results.facts import Level
 
 # At most this many limits are relaxed each alone: each takes about as long as a solve.

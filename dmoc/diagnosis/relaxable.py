@@ -11,7 +11,7 @@ from dmoc.basics.digits import down, time_unit, up
 from dmoc.basics.quaternions import normalised
 from dmoc.diagnosis.elastic import Relaxation, Relaxed
 from dmoc.diagnosis.giving import Giving, Limits, Remedy
-from dmoc.ipopt.run import Interrupt
+from dmoc.ipopt.watch import Interrupt
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import NLP
 from dmoc.nlp.transcription import transcribe_onto

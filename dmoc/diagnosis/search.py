@@ -14,7 +14,7 @@ from dmoc.diagnosis.elastic import MET, Relaxation
 from dmoc.diagnosis.giving import Giving
 from dmoc.diagnosis.relaxable import LEAST, Relaxable
 from dmoc.diagnosis.without import FAR_OFF, too_little_propellant, unlimited
-from dmoc.ipopt.run import Interrupt
+from dmoc.ipopt.watch import Interrupt
 from dmoc.motion.path import DiscretePath
 from dmoc.results.facts import Level
 from dmoc.scene.problem import TransferProblem

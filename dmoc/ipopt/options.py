@@ -112,7 +112,7 @@ def settings_for(
         "ipopt.acceptable_obj_change_tol": 1e-10,
         "ipopt.max_iter": 1000,
     }
-    settings |= _linear_solver(problem, mesh, curved)
+    settings |= _linear_solver(problem, curved)
     settings |= {} if curved else _barrier(problem, warm, carried)
     if (
         problem.limited
@@ -145,7 +145,7 @@ def settings_for(
     return settings
 
 
-def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> dict[str, Any]:
+def _linear_solver(problem: TransferProblem, curved: bool) -> dict[str, Any]:
     """Options for MUMPS, which solves the linear systems."""
     settings: dict[str, Any] = {}
     if curved:
@@ -170,8 +170,6 @@ def _linear_solver(problem: TransferProblem, mesh: np.ndarray, curved: bool) -> 
     elif problem.limited:
         # With barrier terms MUMPS' default matching delays pivots: it took 8 s instead of 0.15 s an iteration.
         settings["ipopt.mumps_permuting_scaling"] = 0
-        if len(mesh) > 1000:
-            settings["ipopt.mumps_pivot_order"] = 5
     return settings
 
 

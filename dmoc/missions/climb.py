@@ -12,7 +12,7 @@ from dmoc.chains.path import MissionPath, cold
 from dmoc.chains.program import MissionProgram
 from dmoc.diagnosis.legs import mission_cause
 from dmoc.ipopt.options import NEAR
-from dmoc.ipopt.run import Interrupt, Watch
+from dmoc.ipopt.watch import Interrupt, Watch
 from dmoc.missions.answer import answered, straightened
 from dmoc.missions.attempt import Attempt, change, rounded_to
 from dmoc.missions.drops import with_best_drops

@@ -13,7 +13,8 @@ import numpy as np
 from dmoc.basics.arguments import of_kind
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, rounding, settings_for
-from dmoc.ipopt.run import Answer, Interrupt, Watch, make_solver, run
+from dmoc.ipopt.run import Answer, make_solver, run
+from dmoc.ipopt.watch import Interrupt, Watch
 from dmoc.motion.march import force_of
 from dmoc.motion.mesh import node_weights
 from dmoc.motion.momenta import end_momenta

@@ -17,7 +17,7 @@ from dmoc.diagnosis.search import confirmed_cause, lacks_propellant
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
-from dmoc.ipopt.run import Interrupt
+from dmoc.ipopt.watch import Interrupt
 from dmoc.meshes.choices import coarse_to_fine
 from dmoc.meshes.widths import rounding_stages
 from dmoc.motion.dynamics import Dynamics

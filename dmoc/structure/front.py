@@ -11,7 +11,7 @@ from dmoc.basics.files import as_path
 from dmoc.basics.memory import unchanged
 from dmoc.checks import verification
 from dmoc.checks.verification import Report
-from dmoc.ipopt.run import one_clock
+from dmoc.ipopt.watch import one_clock
 from dmoc.nlp.solving import Progress
 from dmoc.results import solution as transfers
 from dmoc.results.netcdf import format_of

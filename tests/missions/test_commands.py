@@ -10,7 +10,7 @@ import pytest
 from dmoc import Leg, Mission, State, load, solve
 from dmoc.cli.app import main
 from dmoc.cli.options import CHECK_FAILED, NOT_SOLVED, SOLVED
-from dmoc.ipopt.run import Interrupt
+from dmoc.ipopt.watch import Interrupt
 
 HOHMANN = '''"""From one circular orbit to another by two impulses."""
 from dmoc import CircularOrbit, Coast, DeltaV, Impulse, Mission, PointGravity
