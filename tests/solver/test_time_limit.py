@@ -6,7 +6,7 @@ import pytest
 
 from dmoc import BallForce, State, TransferProblem, load, solve
 from dmoc.cli.app import main
-from dmoc.ipopt import run as ipopt
+from dmoc.ipopt import watch as ipopt
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.proven import QUESTION
 from dmoc.structure.coarse import coarse_answer
