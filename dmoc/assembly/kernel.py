@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
-from dmoc.basics.compiled import compiled
+from dmoc.assembly.compiled import compiled
 from dmoc.basics.numerics import chained, nonzeros_of, used_in
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)

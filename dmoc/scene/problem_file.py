@@ -14,13 +14,14 @@ import linecache
 import sys
 import traceback
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.docstrings import documented, first_line
 from dmoc.basics.plain import unbroken
+from dmoc.basics.records import dataclass
 
 if TYPE_CHECKING:
     from dmoc.scene.problem import TransferProblem
@@ -286,8 +287,7 @@ def _nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _cut(repr(value), 60)
 
 
 def _one_line(error: BaseException) -> str:

@@ -155,7 +155,7 @@ def solve(
         that it raises ends the solve and is raised by it.
     compiled : bool
         Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
-        once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with
+        once for a scene and order, then the library is kept (`dmoc.assembly.compiled`); it pays in scenes with
         several effects and in repeated solves. Without a compiler nothing changes.
     time_limit : float
         Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
