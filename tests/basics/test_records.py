@@ -7,6 +7,7 @@ import dataclasses
 import inspect
 import pickle
 from dataclasses import field
+from functools import partial
 from threading import Thread
 from typing import ClassVar
 
@@ -122,8 +123,9 @@ def test_objects_compare_copy_and_stay_alike(kind, whole):
         with pytest.raises(TypeError, match="unhashable type: 'list'"):
             hash(one(1.0))
     for name in ("size", "new"):
-        assert told(lambda name=name: setattr(kind(1.0), name, 2)) == told(lambda: setattr(whole(1.0), name, 2))
-        assert told(lambda name=name: delattr(kind(1.0), name)) == told(lambda: delattr(whole(1.0), name))
+        ours, theirs = kind(1.0), whole(1.0)
+        assert told(partial(setattr, ours, name, 2)) == told(partial(setattr, theirs, name, 2))
+        assert told(partial(delattr, ours, name)) == told(partial(delattr, theirs, name))
     for one in (kind, whole):
         free = type("Free", (one,), {})(1.0)
         free.new = 3
