@@ -174,8 +174,8 @@ def let_go(try_on: Callable[..., Rung], rung: Rung, lean: float, tolerance: floa
 
     Each answer is held near the one before, and begins with its multipliers: a switch then moves by little.
     Every second one is held as strongly as the one before it, which ends up nearer to the optimum, and the next
-    one less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered; after one that
-    took few iterations the next is held far less.
+    one less. Held at a tenth each, and begun anew, attempts took a hundred iterations or wandered; after one
+    that took few iterations the next is held far less.
     """
     share = LESS
     for _ in range(MOST_LET_GO):

@@ -1,6 +1,7 @@
 """How an answer that is held near another one is let go."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import pytest
 
@@ -46,5 +47,5 @@ def test_an_answer_is_let_go_sooner_where_that_takes_few_iterations(iterations, 
     found = let_go(try_on, Held(0, 1.0), 1e-2)
     assert found is not None and found.pull <= off_optimum()
     known = [1e-2, *held]
-    given = [after / before for before, after in zip(known, known[1:], strict=False)]
+    given = [after / before for before, after in pairwise(known)]
     assert given == pytest.approx(shares)
