@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.ipopt.run import ALWAYS, run
 from dmoc.ipopt.watch import Follower, Interrupt, Watch
 from dmoc.motion.path import DiscretePath

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.starting import angle_around
 from dmoc.motion.path import DiscretePath

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -12,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.basics.numerics import in_plain_memory
+from dmoc.basics.records import dataclass
 from dmoc.ipopt.watch import Follower, Watch
 
 

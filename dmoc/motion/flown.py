@@ -11,10 +11,9 @@ the scheme's weights obeys them. No impulse is flown that is not paid for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import step_nodes

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.diagnosis.search import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import coarse_to_fine
@@ -79,6 +78,8 @@ def _was_led(ladder: Ladder, rung: Rung) -> bool:
 
 def _blamed(ladder: Ladder, leap: Rung, guess: DiscretePath) -> Rung:
     """A leap as the failure that it is, if zones leave no way and it is known what must give way."""
+    from dmoc.diagnosis.search import confirmed_cause
+
     cause = confirmed_cause(ladder.problem, guess, ladder.tell, ladder.interrupt)
     if not (cause.zones and cause.needs) or ladder.interrupt.seen:
         return leap
