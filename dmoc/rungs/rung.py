@@ -37,7 +37,7 @@ MOST_HOLDING = 200
 LESS, LEAST_LESS = 0.3, 0.7
 # After an answer that took no more than the first of these numbers of iterations the next one is held so many
 # times as strongly [-], and none as strongly as before. Held forces that switch on 5,745 steps were let go in 4
-# answers of 6 to 11 iterations, not in more than 6.
+# answers of 3 to 11 iterations, not in more than 6.
 EASY = (10, 0.03), (25, 0.1)
 # Each of these attempts ends after this many iterations, those that get there take 4 to 60, and there are no
 # more than so many.
