@@ -127,7 +127,7 @@ def settings_for(
         if size == FLAT:
             # The answer is that at this barrier: a lower one took 35 of 64 iterations, or 105 of 150 that led
             # nowhere, for 3e-6 of the propellant at most.
-            settings["ipopt.mu_target"] = FLAT
+            settings["ipopt.mu_target"] = size
     if _falls_past(problem, mesh) and not warm and not _meters(problem):
         # As there: the guess is the path of least effort, and past an attractor Ipopt does not come back to it.
         settings |= dict.fromkeys(NEAR, 1e-6)

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.numerics import coefficients
 from dmoc.basics.arguments import entries, number, of_kind, whole
 from dmoc.basics.numerics import columns
 from dmoc.effects.gravity import PointGravity
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.reference import coefficients
 from dmoc.motion.step import step_map, weighted
 from dmoc.scene.problem import TransferProblem
 
