@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,11 +19,9 @@ from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import least_extent, path_scales
 from dmoc.motion.step import weighted
 
-# The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
-# into a singularity.
+# It gives up if the steps of a path need more parts than this in all: such a path runs into a singularity.
 MOST_PARTS = 1_000_000
-# The independent integrator may miss the goal by this part of the path [-] if no tolerance was asked for: a
-# mesh that is too coarse for its motion misses by more.
+# It may miss the goal by this part of the path [-] where no tolerance is asked for: coarse meshes miss by more.
 MISSED = 1e-2
 
 

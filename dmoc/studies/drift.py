@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from dmoc.basics.numerics import coefficients
 from dmoc.basics.arguments import entries, number, of_kind, whole
-from dmoc.basics.numerics import columns
+from dmoc.basics.numerics import coefficients, columns
 from dmoc.effects.gravity import PointGravity
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
