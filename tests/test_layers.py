@@ -137,6 +137,63 @@ def test_the_front_loads_nothing_heavy():
     assert done.stdout.split() == []
 
 
+# What a plain solve from the command line loads beside the standard library, and what for.
+WHY = {
+    "numpy": "arrays",
+    "casadi": "the functions, their derivatives, Ipopt",
+    "swig_runtime_data": "what the classes of CasADi share",
+    "typer": "reads the command line",
+    "annotated_doc": "Typer loads it",
+    "shellingham": "Typer loads it",
+    "rich": "tables and colours",
+    "dmoc_problem_free_flyer": "the problem file",
+}
+# The same of dmoc's own folders, those that the statement and the solve of any transfer need left out.
+WHY_FOLDERS = {
+    "answers": "the answer in numbers",
+    "bodies": "the base of controls, which those of a body that turns are told from",
+    "checks": "the checks",
+    "diagnosis": "the words for a failure, whether an answer goes the wrong way round; no search for a cause",
+    "links": "the base of constraints between bodies, which others are told from",
+    "reports": "the tables",
+    "results": "the answer; neither files of it nor their format",
+    "structure": "`dmoc.solve`, which takes transfers, missions and teams",
+}
+NEEDED = (
+    """cli basics effects configurations parts ends scene motion guess ipopt assembly nlp meshes rungs solver"""
+)
+UNUSED = """hashlib _hashlib tempfile secrets json dmoc.basics.files dmoc.results.netcdf dmoc.results.table
+dmoc.assembly.compiled dmoc.assembly.streamed dmoc.diagnosis.search dmoc.diagnosis.elastic rich.live"""
+
+
+def test_all_that_a_plain_solve_loads_has_its_reason():
+    script = (
+        "import atexit, sys\nknown = set(sys.modules)\nfrom dmoc.cli import main\n"
+        "atexit.register(lambda: print(*set(sys.modules) - known, file=sys.stderr))\n"
+        "main(['solve', 'free_flyer'])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    loaded = set(done.stderr.split())
+    foreign = {name.split(".")[0] for name in loaded} - sys.stdlib_module_names
+    roots = {name.rstrip("0123456789") for name in foreign}
+    assert roots <= {"dmoc", *WHY} and {"numpy", "casadi", "typer", "rich"} <= roots
+    folders = {name.split(".")[1] for name in loaded if name.startswith("dmoc.")}
+    assert folders == set(NEEDED.split()) | WHY_FOLDERS.keys()
+    assert not loaded & set(UNUSED.split())
+
+
+def test_the_command_line_ends_without_a_search_for_rings():
+    """Python's own searches, after every 700 new objects and at its end, take a sixth of a small solve."""
+    script = (
+        "import atexit, gc\nfrom dmoc.cli import main\n"
+        "state = lambda: (gc.get_freeze_count() > 10_000, gc.get_threshold()[0] > 10_000, gc.isenabled())\n"
+        "atexit.register(lambda: print(*state()))\n"
+        "main(['list'])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "True True True"
+
+
 TEAMS = ["dmoc.scene.team", "dmoc.legs.together", "dmoc.teams.program", "dmoc.teams.solution"]
 HEAVY = ["scipy", "matplotlib", "xarray", "pandas", "h5py", "pydantic"]
 

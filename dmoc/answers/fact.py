@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ of the unknowns and into other rows of the constraints. Nothing here knows mecha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.assembly.kernel import Kernel
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)

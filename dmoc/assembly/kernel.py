@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
-from dmoc.basics.compiled import compiled
 from dmoc.basics.numerics import chained, nonzeros_of, used_in
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,8 @@ class Kernel:
     @cached_property
     def compiled(self) -> dict[str, ca.Function]:
         """The functions as machine code where that can be had."""
+        from dmoc.assembly.compiled import compiled
+
         return compiled(self.functions)
 
     def results(self, compiled: bool) -> dict[str, ca.Function]:

@@ -8,13 +8,13 @@ What is here has values only: no derivatives of its own, no C code.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from dmoc.assembly.blocks import Assembly, Block, Scaling, Sums, places_of
 from dmoc.basics.numerics import MOST_COLUMNS, connected, side_by_side
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)

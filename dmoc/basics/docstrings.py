@@ -6,9 +6,10 @@ import difflib
 import inspect
 import re
 from abc import ABC
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
+
+from dmoc.basics.records import dataclass
 
 # The heading of a section is a line at the margin that is underlined.
 _HEADING = re.compile(r"^(\S.*)\n-{3,}\n", re.MULTILINE)

@@ -8,7 +8,6 @@ or belongs to a compiled module, is written down anew in every solve: what it do
 
 from __future__ import annotations
 
-import hashlib
 import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
@@ -198,6 +197,9 @@ def _digest(rows: Any) -> str:
         content = repr((len(rows), nested)).encode() + np.array(numbers).tobytes()
     else:
         content = repr(tuple(map(_listed, rows))).encode()
+    # it loads OpenSSL, 4 ms of which a small solve has no need
+    import hashlib
+
     return hashlib.sha256(content).hexdigest()
 
 

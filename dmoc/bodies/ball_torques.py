@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, number
+from dmoc.basics.records import dataclass
 from dmoc.bodies.torques import PureTorque, Torque
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.rows import Row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -12,6 +12,7 @@ import numpy as np
 from dmoc.basics.arguments import Vector, checked, number, short, vector
 from dmoc.basics.digits import down, up
 from dmoc.basics.quaternions import rotated
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Body
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.constraint import Constraint, checked_on

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, flag, number, short, times_each, vector
 from dmoc.basics.quaternions import AXES
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import open_fields
 from dmoc.bodies.torques import OnBody
 from dmoc.parts.actuator import Actuator, limit_told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -21,6 +21,7 @@ from dmoc.basics.arguments import (
     vector,
 )
 from dmoc.basics.quaternions import AXES
+from dmoc.basics.records import dataclass
 from dmoc.bodies.torques import OnBody
 from dmoc.effects.base import Body
 from dmoc.parts.actuator import Actuator, limit_told

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import reduce
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.legs.legs import Joint
 from dmoc.motion.path import DiscretePath
 from dmoc.scene.mission import Mission

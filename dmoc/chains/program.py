@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from operator import attrgetter
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 
 from dmoc.assembly.blocks import Assembly, Block, Scaling
 from dmoc.assembly.symbolic import assemble
+from dmoc.basics.records import dataclass
 from dmoc.chains.again import assembled_again, kernel_again
 from dmoc.chains.joining import Given, JointWriter, end_parameters, own_unknowns
 from dmoc.chains.path import MissionPath, joint_cost

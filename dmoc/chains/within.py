@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -10,6 +9,7 @@ import numpy as np
 
 from dmoc.assembly.blocks import Block
 from dmoc.basics.memory import remembered
+from dmoc.basics.records import dataclass
 from dmoc.chains.again import kernel_again
 from dmoc.legs.legs import Joint, Leg
 from dmoc.motion.dynamics import Dynamics

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.checks.evidence import Evidence
 from dmoc.configurations.acting import state_symbols
 from dmoc.configurations.coordinates import ATTITUDE

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.numerics import columns
+from dmoc.basics.records import dataclass
 from dmoc.checks.evidence import Evidence
 from dmoc.motion.mesh import node_weights
 from dmoc.nlp.program import Program

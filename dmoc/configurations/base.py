@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body
 

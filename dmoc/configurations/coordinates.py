@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
+from dmoc.basics.records import dataclass
 
 # A place in space: 1 to 3 entries [m] that move at as many speeds [m/s].
 PLACE = "place"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.quaternions import columns_of
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.configurations.rigid import RigidBody
 from dmoc.effects.base import Body

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body

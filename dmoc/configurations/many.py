@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.base import Configuration
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body

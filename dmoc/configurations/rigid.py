@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -11,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import QUATERNION, columns_of, rotation_of
+from dmoc.basics.records import dataclass
 from dmoc.configurations.base import AXES, Configuration
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body

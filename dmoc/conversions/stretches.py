@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import QUATERNION_NAMES
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.momenta import node_velocities

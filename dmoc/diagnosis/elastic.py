@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.ipopt.run import ALWAYS, Follower, Interrupt, Watch, run
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.solving import NLP

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.digits import down, up
+from dmoc.basics.records import dataclass
 from dmoc.motion.path import DiscretePath
 from dmoc.nlp.layout import Group
 from dmoc.nlp.solving import NLP

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
+from dmoc.basics.records import dataclass
 from dmoc.effects.atmosphere import AroundABody, checked_wind
 
 # The polynomial has at least and at most these degrees, and follows the table so closely if it can [-].

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number, short, vector
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Force, Part
 from dmoc.effects.user_functions import as_column, is_zero, tried
 

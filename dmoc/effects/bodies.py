@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short, vector
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Attractor, Body, BodyConservative, BodyForce
 from dmoc.effects.user_functions import as_column, tried
 

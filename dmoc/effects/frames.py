@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, number, vector
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Conservative, Effect
 from dmoc.effects.gravity import PointGravity
 from dmoc.effects.user_functions import as_column

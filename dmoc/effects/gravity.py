@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Attractor, Conservative
 from dmoc.effects.user_functions import as_column
 

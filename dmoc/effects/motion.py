@@ -8,7 +8,6 @@ whose third is identically zero gives its first two.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, number
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Part
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, matching_length, number, short
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Force, Part
 from dmoc.effects.user_functions import given_motion, position_at
 

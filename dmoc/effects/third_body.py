@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.arguments import checked, matching_length, number
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Conservative
 from dmoc.effects.user_functions import given_motion, position_at
 

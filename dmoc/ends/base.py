@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, checked, entries, same_length, vector
 from dmoc.basics.docstrings import Duties
+from dmoc.basics.records import dataclass
 from dmoc.parts.rows import Row
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short
 from dmoc.basics.memory import remembered
+from dmoc.basics.records import dataclass
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row

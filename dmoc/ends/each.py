@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, short
 from dmoc.basics.quaternions import AXES, rotation_of
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.effects.base import Body
 from dmoc.ends.base import Boundary, State

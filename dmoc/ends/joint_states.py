@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -11,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.quaternions import AXES, QUATERNION, unit_quaternion
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Body
 from dmoc.ends.base import Boundary, State
 from dmoc.ends.poses import Pose

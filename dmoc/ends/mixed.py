@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
+from dmoc.basics.records import dataclass
 from dmoc.ends.base import Boundary, State
 from dmoc.ends.poses import Attitude, Pose
 from dmoc.parts.rows import Row

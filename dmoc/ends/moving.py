@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.basics.quaternions import AXES, QUATERNION, columns_of
+from dmoc.basics.records import dataclass
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary
 from dmoc.parts.rows import Row

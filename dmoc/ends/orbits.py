@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, flag, number, vector
+from dmoc.basics.records import dataclass
 from dmoc.ends.base import Boundary
 from dmoc.ends.elements import ELEMENTS, element_rows, nearest_state, plane_elements
 from dmoc.parts.rows import Row

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import FreeVector, Vector, checked, flag, number, short, vector
 from dmoc.basics.quaternions import AXES, QUATERNION, rotation_vectors, unit_quaternion
+from dmoc.basics.records import dataclass
 from dmoc.ends.base import Boundary, State
 
 

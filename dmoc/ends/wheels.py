@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.quaternions import AXES, QUATERNION
+from dmoc.basics.records import dataclass
 from dmoc.bodies.wheels import MomentumLimit
 from dmoc.ends.base import Boundary
 from dmoc.parts.actuator import Actuator

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.quaternions import normalised, rotated
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.links.along import states_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from dmoc.basics.arguments import checked, short
 from dmoc.basics.files import as_path, whole_file
 from dmoc.basics.plain import Brief
 from dmoc.basics.quaternions import QUATERNION, in_one_sign
+from dmoc.basics.records import dataclass
 
 # The columns of a table by the field they belong to; the unit of each.
 COLUMNS = {

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.starting import angle_around
 from dmoc.motion.path import DiscretePath
@@ -41,6 +41,8 @@ class Chart:
         Its distance from the axis [m].
     foot : array, shape (nodes, axes)
         The place on the axis beside it [m], from the origin of the unknowns.
+    height : array, shape (nodes,)
+        How far that is from the attractor, along the axis [m].
     """
 
     normal: np.ndarray
@@ -48,6 +50,7 @@ class Chart:
     along: np.ndarray
     reach: np.ndarray
     foot: np.ndarray
+    height: np.ndarray
 
     @property
     def axes(self) -> int:
@@ -74,7 +77,7 @@ class Chart:
         tables = {"out": self.out, "along": self.along, "foot": self.foot}
         named = {f"{name}.{i}": table[:, i] for name, table in tables.items() for i in range(self.axes)}
         normals = {f"normal.{i}": np.full_like(self.reach, self.normal[i]) for i in range(self.axes)}
-        return named | normals | {"reach": self.reach}
+        return named | normals | {"reach": self.reach, "height": self.height}
 
     def frames(self, angle: np.ndarray) -> np.ndarray:
         """E of every node, shape (nodes, axes, axes), at angles from the path [rad]."""
@@ -96,6 +99,17 @@ def drafted(number: Callable[[str], Any], place: Any) -> tuple[Any, Any]:
     columns = [cos * out + sin * along, cos * along - sin * out, normal][:axes]
     position = foot + (reach + place[0]) * columns[0] + (place[2] * normal if axes == 3 else 0)
     return position, ca.horzcat(*columns)
+
+
+def pulled(number: Callable[[str], Any], place: Any, mu: Any) -> Any:
+    """E^T of the attractor's pull per mass [m/s^2] on a node, from its unknowns: the axis goes through it.
+
+    In this frame it is free of the angle. In the scene's own axes a node has 467 instructions for its second
+    derivatives and 8 entries of them; so it has 49 and 3.
+    """
+    out, up = number("reach") + place[0], number("height") + place[2] if place.numel() == 3 else 0.0
+    square = out**2 + up**2
+    return -mu / (square * ca.sqrt(square)) * ca.vertcat(*[out, 0.0, up][: place.numel()])
 
 
 def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) -> Chart | None:
@@ -124,7 +138,7 @@ def chart_of(problem: TransferProblem, guess: DiscretePath, origin: np.ndarray) 
     out = level / reach[:, None]
     along = np.cross(normal, out)
     foot = (height[:, None] * normal)[:, :n] + lone.place(n) - origin
-    return Chart(normal, out[:, :n], along[:, :n], reach, foot)
+    return Chart(normal, out[:, :n], along[:, :n], reach, foot, height)
 
 
 def is_curved(problem: TransferProblem, guess: DiscretePath) -> bool:

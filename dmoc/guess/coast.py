@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.basics.records import dataclass
 from dmoc.configurations.acting import point_function
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.base import Conservative

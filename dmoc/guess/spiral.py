@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.basics.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.numerics import cross, cubic_spline, root
+from dmoc.basics.records import dataclass
 from dmoc.guess.spiral import MOST_BENT, MOST_BEYOND, ROUNDS, SAMPLES_A_TURN, _axes
 
 

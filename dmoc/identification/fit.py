@@ -12,13 +12,13 @@ their covariance, with all of the path and all forces unknown beside them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from dmoc.basics.records import dataclass
 from dmoc.identification.equations import Equations
 from dmoc.identification.pattern import Pattern
 from dmoc.identification.setting import Setting

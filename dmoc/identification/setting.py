@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from dmoc.assembly.blocks import Block
 from dmoc.basics.quaternions import normalised, times
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import ATTITUDE, PLACE
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.flights.flight import Flight

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, short
 from dmoc.basics.quaternions import AXES as SPACE
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import Unknown, at, has_unknown, is_unknown, numeric_fields, with_field
 from dmoc.bodies.torques import Torque, Wrench
 from dmoc.configurations.rigid import checked_inertia

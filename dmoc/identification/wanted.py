@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.docstrings import documented
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import Unknown, at, is_unknown, with_field
 from dmoc.parts.rows import title
 

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -16,6 +15,7 @@ import numpy as np
 
 from dmoc.basics.arguments import short
 from dmoc.basics.numerics import in_plain_memory
+from dmoc.basics.records import dataclass
 
 
 class Status(NamedTuple):

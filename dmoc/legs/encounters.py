@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
+from dmoc.basics.records import dataclass
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.ends.base import Boundary
 from dmoc.ends.moving import Moving

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
@@ -11,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Duties
+from dmoc.basics.records import dataclass
 from dmoc.ends.base import Boundary, State
 from dmoc.parts.rows import Row
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, short, whole
 from dmoc.basics.docstrings import Named
+from dmoc.basics.records import dataclass
 from dmoc.ends.base import Boundary
 from dmoc.legs.events import Event
 from dmoc.parts.forces import Unpowered

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from dmoc.basics.arguments import short
+from dmoc.basics.records import dataclass
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.objectives import Objective
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 from dmoc.basics.arguments import checked, entries, flag, number, short
 from dmoc.basics.digits import down
 from dmoc.basics.docstrings import Duties
+from dmoc.basics.records import dataclass
 from dmoc.parts.constraint import Constraint
 from dmoc.parts.detours import KeepOut
 from dmoc.parts.rows import Row

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
 from dmoc.basics.digits import down, up
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Body
 from dmoc.links.along import states_of
 from dmoc.links.joint import Joint, room

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -11,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, short
 from dmoc.basics.quaternions import AXES, columns_of, rotated, rotation_of, slerp, turned_by
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Body
 from dmoc.links.joint import IDENTITY, Joint, three
 

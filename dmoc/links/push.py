@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
 from dmoc.basics.digits import up
+from dmoc.basics.records import dataclass
 from dmoc.links.joints import Prismatic, Revolute, Spherical
 from dmoc.links.rods import Rod
 from dmoc.parts.actuator import Actuator

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, number, short, vector
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Body
 from dmoc.links.holonomic import Holonomic
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, of_kind
+from dmoc.basics.records import dataclass
 from dmoc.parts.actuator import Actuator
 from dmoc.parts.outline import Jet
 from dmoc.parts.rows import Row

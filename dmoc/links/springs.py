@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, number, short
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Between, Body
 from dmoc.links.joint import Joint
 from dmoc.links.rods import Rod

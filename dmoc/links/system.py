@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from dmoc.basics.arguments import checked, entries, number, of_kind, short
 from dmoc.basics.docstrings import Named
+from dmoc.basics.records import dataclass
 from dmoc.configurations.rigid import checked_inertia
 from dmoc.links.holonomic import Holonomic
 

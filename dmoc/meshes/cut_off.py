@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import columns
 from dmoc.basics.quaternions import normalised
+from dmoc.basics.records import dataclass
 from dmoc.configurations.acting import state_symbols
 from dmoc.meshes.cuts import PARTS
 from dmoc.motion.dynamics import Dynamics

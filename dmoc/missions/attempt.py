@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.ipopt.run import Answer

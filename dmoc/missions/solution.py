@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.basics.records import dataclass
 from dmoc.chains.path import MissionPath
 from dmoc.results.facts import Error, Level, Provenance
 from dmoc.results.netcdf import (

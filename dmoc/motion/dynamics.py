@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 
 from dmoc.basics.memory import remembered_property
+from dmoc.basics.records import dataclass
 from dmoc.configurations.acting import (
     kinetic_at_nodes,
     point_function,
@@ -31,7 +31,7 @@ class Dynamics:
 
     configuration: Configuration
     effects: tuple[Effect, ...] = ()
-    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
+    actuator: Actuator = FreeForce()
 
     @classmethod
     def of(cls, problem: Any, effects: tuple[Effect, ...] | None = None) -> Dynamics:

@@ -11,10 +11,9 @@ is flown that is not paid for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import step_nodes
@@ -28,15 +27,13 @@ LOOKED_AT = np.linspace(0.0, 1.0, 17)
 # Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less
 # than a hundred-thousandth.
 CLOSELY = np.linspace(0.0, 1.0, 129)
-# A thrust is at its limit at a node if it is so by this part of it [-].
-FULL = 1e-6
+FULL = 1e-6  # a thrust is at its limit at a node if it is so by this part of it [-]
 # Pieces of a step in which a thrust at its limit turns: in each its size swings by less than a thousandth of
 # what it does in the whole step.
 TURNING = np.linspace(0.0, 1.0, 5)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
-# Halvings of the interval for how far apart the pieces may be: to a millionth.
-HALVINGS = 21
+HALVINGS = 21  # of the interval for how far apart the pieces may be: to a millionth
 # A force of free direction has so many pieces near its polynomial, by so many projections at most: until its
 # first moment is right to this part of the limit [-]. After 300 revolutions with 1,200 switches 8 pieces miss
 # the goal by 0.004 of the path, the other ways by 0.05.
@@ -107,8 +104,8 @@ def _mended(
     turns, bounds, pieces = _turning(dynamics, rule, values, path.place.shape[1])
     best, ways = np.zeros(values.shape[1], int), [(bounds, pieces)]
     if not turns.all():
-        free = dynamics.actuator.nearest(values[0]) is not None
-        others = (_nearest,) if free else (_drawn_in, _two_pieces, _node_pieces)
+        tied = dynamics.actuator.nearest(values[0]) is None
+        others = (_drawn_in, _two_pieces, _node_pieces) if tied else (_nearest,)
         ways += [way(dynamics, rule, values) for way in others]
         whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
         wanted = _moments(rule, whole, values[:, None])
@@ -209,8 +206,8 @@ def _nearest(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.n
         wrong = np.abs(off).max(axis=(0, 2)) > RIGHT * (dynamics.actuator.main_limit() or 1.0)
         found[:, left] += np.einsum("mp,mkn->pkn", basis, off * wrong[:, None])
         left = left[wrong]
-    mean, apart = wanted[0], found - np.einsum("p,pkn->kn", weights, found)
-    pieces = apart.reshape(-1, NEAREST_PIECES, *mean.shape)
+    mean = wanted[0]
+    pieces = (found - np.einsum("p,pkn->kn", weights, found)).reshape(-1, NEAREST_PIECES, *mean.shape)
     looked = np.einsum("pj,jikn->pikn", rule.values_at(LOOKED_AT), pieces).reshape(-1, 1, *mean.shape)
     pieces = mean + _share_within(dynamics, mean, looked)[0][:, None] * pieces
     return np.broadcast_to(ends, (len(mean), len(ends))), pieces

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from dmoc.basics.arguments import short
+from dmoc.basics.records import dataclass
 
 # The schemes have these orders, 2 s for a polynomial of degree s = 1 to 4 in each step.
 ORDERS = (2, 4, 6, 8)

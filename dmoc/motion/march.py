@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 from dmoc.basics.arguments import flag, number, of_kind, short, whole
 from dmoc.basics.numerics import columns
 from dmoc.basics.plain import Brief
+from dmoc.basics.records import dataclass
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme

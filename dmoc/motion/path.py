@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from dmoc.basics.arguments import LARGEST, number
 from dmoc.basics.numerics import cubic_spline
 from dmoc.basics.plain import Brief
 from dmoc.basics.quaternions import angle_between, normalised, times
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import ATTITUDE, Coordinates
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.mesh import node_fractions

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.quaternions import angle_between
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import WHEELS, Coordinates
 from dmoc.motion.path import DiscretePath
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from itertools import pairwise
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.numerics import columns
 from dmoc.basics.quaternions import angle_between
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes

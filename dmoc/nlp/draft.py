@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from dmoc.assembly.kernel import kernel
-from dmoc.guess.chart import drafted
+from dmoc.guess.chart import drafted, pulled
 from dmoc.nlp.layout import LEG_MASS, LEG_START, Limit, Owner, Stencil
 from dmoc.parts.rows import Row
 
@@ -50,12 +50,17 @@ class Draft:
         unknowns = self.take("position", n, at)
         if not self.writer.curved:
             return unknowns, ca.DM.eye(n)
-        return drafted(lambda name: self.number(name, at), unknowns)
+        place, frame = drafted(lambda name: self.number(name, at), unknowns)
+        return self.between([place])[0], frame
+
+    def pulled(self, mu: Any) -> ca.SX:
+        """The pull of the attractor at the node of a curved place, in the frame there."""
+        return pulled(lambda name: self.number(name), self._symbols[0], mu)
 
     def control(self, frame: Any, at: slice = ALL) -> ca.SX:
-        """The controls of a node, whose force is in the frame there."""
+        """The controls of a node, whose force is in the frame there; kept in it if it acts alike in all."""
         u, n = self.take("force", self.writer.dynamics.controls, at), self.writer.dynamics.positions
-        return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved else u
+        return ca.vertcat(frame @ u[:n], u[n:]) if self.writer.curved and not self.writer.alike else u
 
     def velocity(self, end: str, frame: Any) -> ca.SX:
         """The velocity at one end, which is in the frame there."""
@@ -85,7 +90,8 @@ class Draft:
     def between(self, known: list) -> list:
         """Symbols that stand for some columns in the rows: see `kernel`."""
         symbols = [ca.SX.sym(f"between_{i}", column.numel()) for i, column in enumerate(known)]
-        self._between = ca.vertcat(*symbols), ca.vertcat(*known)
+        former = self._between or (ca.SX(0, 1), ca.SX(0, 1))
+        self._between = ca.vertcat(former[0], *symbols), ca.vertcat(former[1], *known)
         return symbols
 
     def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dmoc.assembly.kernel import Kernel
+from dmoc.basics.records import dataclass
 from dmoc.guess.chart import Chart
 from dmoc.ipopt.run import Answer
 from dmoc.parts.rows import Row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.assembly.blocks import Assembly
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import PLACE, Coordinates
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.guess.chart import Chart
@@ -100,8 +101,7 @@ class Program:
             lower[self.columns["mass"].start] = upper[self.columns["mass"].start] = problem.mass
         for end, name, place in ((problem.start, "start", 0), (problem.goal, "goal", -1)):
             position, velocity = end.fixed()
-            places = self.columns["position"].indices[:, place]
-            _fix(lower, upper, places, position - origin)
+            _fix(lower, upper, self.columns["position"].indices[:, place], position - origin)
             _fix(lower, upper, self.columns[f"{name}.velocity"].indices[:, 0], velocity)
         if SENSITIVITY in self.columns:
             _fix(lower, upper, self.columns[SENSITIVITY].indices[:, 0], at_start(problem))

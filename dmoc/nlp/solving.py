@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.basics.records import dataclass
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, rounding, settings_for
 from dmoc.ipopt.run import Answer, Interrupt, Watch, make_solver, run

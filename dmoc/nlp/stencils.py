@@ -16,13 +16,14 @@ import casadi as ca
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.unknown import with_field
-from dmoc.configurations.acting import point_function, split_effects
+from dmoc.configurations.acting import point_function, split_effects, state_symbols
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.draft import ALL, Draft
+from dmoc.nlp.frames import are_alike
 from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
 from dmoc.nlp.lesson import Lesson
 from dmoc.parts.rows import Row, built_in, title, with_symbols
@@ -91,6 +92,8 @@ class Writer:
         # the two are the same. Paid at the goal alone, it took five times the iterations, or did not end.
         self.mass_worth = mass_worth(problem)
         self.lesson = Lesson(self) if problem.objective.learns else None
+        # Whether controls and their cost are the same in every frame.
+        self.alike = curved and self._is_alike()
 
     def node(self) -> Stencil:
         """Impulse, cost and limits of one node."""
@@ -102,11 +105,17 @@ class Writer:
         t, q = draft.clock() + fraction * duration, r + self.origin
         # The kinetic energy and effects that look at the velocity act in the steps, with their own velocities.
         resting, _ = split_effects(self.effects, body)
+        # What turns with the frame is added in it: there it is free of the angle.
+        turning: Any = 0
+        if self.curved:
+            turning = draft.pulled(next(source.mu for one in resting if (source := one.attractor())))
+            resting = tuple(one for one in resting if one.attractor() is None)
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
-        push = push if u is None else push + body.driven(self.actuator, q, u, m)
+        driven = 0 if u is None else body.driven(self.actuator, q, u, m)
+        push, turning = (push, turning + driven) if self.alike else (push + driven, turning)
         if body.conditions:
             push = push - body.pull(q, draft.take("reaction", body.conditions))
-        draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)))
+        draft.add("dynamics", frame.T @ (duration * weight * (dldq + push)) + duration * weight * turning)
         if body.surplus:
             rows = [Row(str(i), row, 0.0, 0.0) for i, row in enumerate(ca.vertsplit(body.g(q))[: body.surplus])]
             draft.limit(CONSTRAINT, "node", rows)
@@ -260,6 +269,20 @@ class Writer:
         if self.mass_worth:
             rate = rate - self.mass_worth * self.actuator.flow(u)
         return self.objective.sense * rate
+
+    def _is_alike(self) -> bool:
+        """Whether a control acts, burns and costs the same in every frame."""
+        t, q, v, m = state_symbols(self.dynamics.positions)
+
+        def acts(u: ca.SX) -> ca.SX:
+            return self.dynamics.configuration.driven(self.actuator, q, u, m)
+
+        def tells(u: ca.SX) -> ca.SX:
+            limits = [row.expression for row in self.actuator.rows(u)]
+            burnt = [self.actuator.flow(u)] if self.actuator.burns else []
+            return ca.vertcat(self._rate(t, q, v, u, m), *burnt, *limits)
+
+        return are_alike(acts, tells, self.dynamics.controls, self.dynamics.positions)
 
     def _seen(self, state: tuple) -> tuple:
         """A state as an objective sees it: position and velocity of a body in space."""

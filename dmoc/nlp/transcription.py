@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from dmoc.assembly.blocks import Assembly, Block, Scaling
-from dmoc.assembly.streamed import assemble_streamed
 from dmoc.assembly.symbolic import assemble
 from dmoc.basics.arguments import entries, flag, number, of_kind, short, whole
 from dmoc.basics.memory import Shelf
@@ -124,7 +123,11 @@ def _transcribed(
 
     def make() -> tuple[Stencils, Assembly]:
         given = placed.blocks, scaling, stencils.parameter_count, compiled
-        return stencils, assemble_streamed(*given) if streamed else assemble(*given, small)
+        if streamed:
+            from dmoc.assembly.streamed import assemble_streamed
+
+            return stencils, assemble_streamed(*given)
+        return stencils, assemble(*given, small)
 
     _, assembly = _ASSEMBLIES.get((id(stencils), placed.steps, compiled), make) if small else make()
     parts = units, columns, rows, placed.row_bounds, assembly, assembly.numbers(scaling)

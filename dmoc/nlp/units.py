@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import held_up, turning_torque
 from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import LEAST_TURN, TINY, least_extent, path_scales

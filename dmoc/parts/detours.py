@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, matching_length, number, vector
 from dmoc.basics.digits import down
+from dmoc.basics.records import dataclass
 from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.outline import Ball, Shape
 from dmoc.parts.rows import Row

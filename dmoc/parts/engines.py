@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, entries, limits, number, short, times_each, vector
+from dmoc.basics.records import dataclass
 from dmoc.parts.actuator import Actuator, limit_told
 from dmoc.parts.rows import Row
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 
 from dmoc.basics.arguments import Vector, checked, entries, number, short, vector, whole
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import at, numeric_fields, opened
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import title

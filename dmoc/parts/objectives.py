@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Duties
+from dmoc.basics.records import dataclass
 from dmoc.parts.actuator import Actuator
 
 

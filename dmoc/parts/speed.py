@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -10,6 +10,7 @@ import numpy as np
 
 from dmoc.basics.arguments import Vector, checked, number
 from dmoc.basics.digits import up
+from dmoc.basics.records import dataclass
 from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.rows import Row
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -19,6 +19,7 @@ from dmoc.basics.arguments import (
     vector,
 )
 from dmoc.basics.digits import up
+from dmoc.basics.records import dataclass
 from dmoc.effects.user_functions import as_column, tried
 from dmoc.parts.constraint import Constraint, checked_on, checked_point
 from dmoc.parts.outline import Box, Cone, Shape

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.meshes.cut_off import CutOff
 from dmoc.phases.path import PhasedPath, suffix
 from dmoc.phases.timetable import Timetable

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.chains.path import MissionPath, cut_in_two
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import node_fractions

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from dmoc.assembly.blocks import Block
+from dmoc.basics.records import dataclass
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram, unit_of_cost
 from dmoc.ipopt.run import Answer

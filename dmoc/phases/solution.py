@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.basics.records import dataclass
 from dmoc.missions.solution import MissionSolution, mission_of, mission_parts
 from dmoc.phases.order import Order, Place
 from dmoc.phases.path import PhasedPath

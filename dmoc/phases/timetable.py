@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dmoc.basics.arguments import both_ends
+from dmoc.basics.records import dataclass
 from dmoc.legs.legs import Joint
 from dmoc.phases.order import SAME, Order, as_mission, called
 from dmoc.scene.mission import LEAST_SHARE, Mission

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, number, short
 from dmoc.basics.files import as_path
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Part
 from dmoc.effects.motion import TabulatedMotion, tabulated_motion
 from dmoc.planets import ephemeris as files

@@ -8,13 +8,13 @@ maps and accumulations: its size, and that of C code made from it, does not grow
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import Scheme
 from dmoc.motion.step import step_map

@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.chains.path import MissionPath
 from dmoc.chains.program import MissionProgram
 from dmoc.missions.guess import first_path

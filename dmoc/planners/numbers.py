@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.docstrings import documented
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import Unknown, at, is_number, is_unknown, with_field
 from dmoc.ends.base import Boundary
 from dmoc.nlp.solving import NLP

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.run import Answer
 from dmoc.motion.dynamics import Dynamics

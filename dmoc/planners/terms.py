@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from dmoc.basics.docstrings import documented
+from dmoc.basics.records import dataclass
 from dmoc.basics.unknown import at
 from dmoc.configurations import coordinates
 from dmoc.parts.rows import title, with_symbols

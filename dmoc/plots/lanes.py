@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.checks.primer import worth_of
 from dmoc.plots.style import (
     AXIS_COLOURS,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dmoc.basics.quaternions import QUATERNION, conjugate, normalised
 from dmoc.basics.quaternions import times as product
+from dmoc.basics.records import dataclass
 from dmoc.motion.lobatto import scheme
 from dmoc.motion.mesh import step_nodes
 from dmoc.motion.path import DiscretePath

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from dmoc.basics.records import dataclass
 from dmoc.scene.clock import dates_of
 from dmoc.scene.problem import TransferProblem
 

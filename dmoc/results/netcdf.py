@@ -12,13 +12,13 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.files import AGAIN, as_path, is_sealed, sealed, whole_file
+from dmoc.basics.records import dataclass
 
 # An HDF5 file, and so a netCDF-4 file, begins with these bytes.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import of_kind
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.march import force_of
 from dmoc.motion.momenta import end_momenta
@@ -19,7 +20,6 @@ from dmoc.results.outcome import NOT_MET as NOT_MET
 from dmoc.results.outcome import OUT_OF_TIME as OUT_OF_TIME
 from dmoc.results.outcome import Outcome as Outcome
 from dmoc.results.outcome import SolveError as SolveError
-from dmoc.results.table import read, write
 from dmoc.scene.problem import TransferProblem
 from dmoc.scene.rounding import sharp_as
 
@@ -248,13 +248,14 @@ class Solution(Outcome):
         ValueError
             If the folder does not exist.
         """
+        from dmoc.results.table import write
+
         write(replace(self, provenance=replace(self.provenance, **provenance)), path)
 
 
 def reported(path: DiscretePath, velocity: np.ndarray, momentum: np.ndarray, force: np.ndarray) -> dict:
     """The fields of a solution for independent velocities, momenta and what the actuator does, one row each."""
-    made = path.coordinates
-    places = {"velocity": velocity, "momentum": momentum, "force": force}
+    made, places = path.coordinates, {"velocity": velocity, "momentum": momentum, "force": force}
     found = {name: values[:, made.speeds] for name, values in places.items()}
     if made.turns:
         turns = {"rate": velocity, "spin": momentum, "torque": force}
@@ -294,4 +295,6 @@ def load(path: str | os.PathLike) -> Solution:
     ValueError
         If there is no such file, or it is damaged, foreign or from a newer dmoc.
     """
+    from dmoc.results.table import read
+
     return read(path, Solution)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.basics.records import dataclass
 from dmoc.diagnosis.cause import Cause
 from dmoc.diagnosis.giving import Remedy
 from dmoc.ipopt.run import STATUSES, Answer

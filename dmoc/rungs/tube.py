@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import MANY_TURNS
 from dmoc.guess.starting import angle_around
 from dmoc.motion.path import POSITION_BOUNDS, DiscretePath

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Attractor, Effect
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any
 
 from dmoc.basics.arguments import both_ends, checked, entries, number, short
 from dmoc.basics.docstrings import Named
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
 from dmoc.ends.on_limits import refuse_mission_ends
@@ -66,8 +67,8 @@ class Mission(Named):
     goal: Boundary
     legs: Sequence
     effects: Sequence[Effect] = ()
-    actuator: Actuator = FreeForce()  # noqa: RUF009 - immutable
-    objective: Objective = Effort()  # noqa: RUF009 - immutable
+    actuator: Actuator = FreeForce()
+    objective: Objective = Effort()
     constraints: Sequence[Constraint] = ()
     duration: Any = None
     start_time: Any = 0.0

@@ -6,7 +6,6 @@ the working folder that it was made from: a file must not choose what is run.
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ def attached_as_named(solution: Any) -> Any:
     if source is None:
         solution.require_problem()  # says that there is none, and what to do
     path = find(str(source))
-    if hashlib.sha256(path.read_bytes()).hexdigest() == known.source_hash:
+    if _has_hash(path, known.source_hash):
         return attached_from(load_problem(str(source)), solution)
     raise ValueError(
         f"this solution was loaded from a file and does not hold its problem {known.problem_name!r}, and "
@@ -44,6 +43,12 @@ def named(name: str, source_hash: str) -> str | None:
     """What a saved solution names: the file with its hash in the working folder, else one of the folders'."""
     here = Path(f"{name}.py")
     known = bool(source_hash) and here.name == f"{name}.py" and here.is_file()
-    if known and hashlib.sha256(here.read_bytes()).hexdigest() == source_hash:
+    if known and _has_hash(here, source_hash):
         return str(here)
     return name if name.isidentifier() and has_problem(name) else None
+
+
+def _has_hash(path: Path, source_hash: str) -> bool:
+    import hashlib
+
+    return hashlib.sha256(path.read_bytes()).hexdigest() == source_hash

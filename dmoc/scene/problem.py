@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import checked, entries, number, short
 from dmoc.basics.docstrings import Named
+from dmoc.basics.records import dataclass
 from dmoc.configurations.of_problem import unknown_parts
 from dmoc.effects.base import Effect
 from dmoc.ends.base import Boundary
@@ -82,8 +83,8 @@ class TransferProblem(Named):
     goal: Any
     duration: float | tuple[float, float]
     effects: Sequence[Effect] = ()
-    actuator: Any = FreeForce()  # noqa: RUF009 - immutable
-    objective: Objective = Effort()  # noqa: RUF009 - immutable
+    actuator: Any = FreeForce()
+    objective: Objective = Effort()
     constraints: Sequence[Constraint] = ()
     guess: Any = None
     start_time: float = 0.0

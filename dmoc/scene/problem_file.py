@@ -7,20 +7,20 @@ that returns one. Its docstring documents them as `name : type [unit]`.
 from __future__ import annotations
 
 import ast
-import difflib
-import hashlib
 import inspect
 import linecache
 import sys
 import traceback
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.docstrings import documented, first_line
-from dmoc.basics.plain import unbroken
+from dmoc.basics.plain import meant, unbroken
+from dmoc.basics.records import dataclass
 
 if TYPE_CHECKING:
     from dmoc.scene.problem import TransferProblem
@@ -53,16 +53,23 @@ class ProblemFile:
         The file's name without `.py`.
     parameters : tuple of Parameter
         The keyword defaults of its function.
-    source_hash : str
-        SHA-256 of the file.
+    source : bytes
+        The file as it was read.
     """
 
     name: str
     path: Path
     docstring: str
     parameters: tuple[Parameter, ...]
-    source_hash: str
+    source: bytes = field(repr=False)
     function: Callable[..., Any] = field(repr=False, compare=False)
+
+    @cached_property
+    def source_hash(self) -> str:
+        """SHA-256 of the file."""
+        import hashlib
+
+        return hashlib.sha256(self.source).hexdigest()
 
     def make(self, **values: Any) -> TransferProblem:
         """The transfer problem, with these values in place of the defaults.
@@ -90,7 +97,7 @@ class ProblemFile:
         if name in known:
             return known[name]
         listing = ", ".join(known) or "none"
-        raise ValueError(f"{self.name} has no parameter {name!r}{_nearest(name, known)}; it has: {listing}")
+        raise ValueError(f"{self.name} has no parameter {name!r}{meant(name, known)}; it has: {listing}")
 
 
 def folders() -> list[Path]:
@@ -132,7 +139,7 @@ def find(name: str) -> Path:
     paths = {path.stem: path for path in reversed(_files())}
     if name in paths:
         return paths[name]
-    hint = _nearest(name, paths) or f"; there are: {', '.join(sorted(paths)) or 'none'}"
+    hint = meant(name, paths) or f"; there are: {', '.join(sorted(paths)) or 'none'}"
     raise ValueError(f"there is no problem {name!r}{hint}; dmoc list shows all, or give a path to a .py file")
 
 
@@ -158,8 +165,7 @@ def load_problem(name: str) -> ProblemFile:
         unit, description = (entries[name].unit, entries[name].description) if name in entries else ("", "")
         parameters.append(Parameter(name, given.default, unit, description))
     docstring = inspect.getdoc(module) or inspect.getdoc(function) or ""
-    digest = hashlib.sha256(source).hexdigest()
-    return ProblemFile(path.stem, path, docstring, tuple(parameters), digest, function)
+    return ProblemFile(path.stem, path, docstring, tuple(parameters), source, function)
 
 
 def parse_settings(settings: Iterable[str], option: str = "--set") -> dict[str, Any]:
@@ -280,14 +286,8 @@ def _check_type(name: str, value: Any, default: Any) -> None:
         )
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    return f" (did you mean {near[0]}?)" if near else ""
-
-
 def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _cut(repr(value), 60)
 
 
 def _one_line(error: BaseException) -> str:

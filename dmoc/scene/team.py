@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.arguments import checked, entries, short
 from dmoc.basics.docstrings import Named
+from dmoc.basics.records import dataclass
 from dmoc.legs.together import Frames, Together
 from dmoc.parts.objectives import Objective
 from dmoc.parts.rows import snake

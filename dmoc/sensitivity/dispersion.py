@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.special import betaincinv
 
 from dmoc.basics.arguments import entries, flag, number, short, whole
+from dmoc.basics.records import dataclass
 from dmoc.sensitivity.feedback import flights_of, gains_of
 
 # A limit counts as broken beyond this part of the extent of the path, or of the mean speed [-]: a plan may

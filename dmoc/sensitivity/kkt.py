@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from dmoc.basics.records import dataclass
 from dmoc.sensitivity.optimum import Optimum
 
 # What solves the linear system is right if it leaves this part of the right-hand side [-].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
@@ -15,6 +15,7 @@ from scipy import sparse
 from dmoc.assembly.blocks import Block
 from dmoc.assembly.kernel import Kernel
 from dmoc.basics.memory import Shelf
+from dmoc.basics.records import dataclass
 from dmoc.nlp.transcription import unassembled
 from dmoc.nlp.units import units_of
 from dmoc.planners.numbers import Numbers, numbers_of_team

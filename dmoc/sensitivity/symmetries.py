@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.coordinates import PLACE
 from dmoc.sensitivity.optimum import Optimum
 from dmoc.sensitivity.worth import conditions_of, per

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from dmoc.basics.arguments import of_kind
 from dmoc.basics.memory import Shelf
 from dmoc.basics.quaternions import times
+from dmoc.basics.records import dataclass
 from dmoc.planners.numbers import Number
 from dmoc.planners.terms import ATTITUDE
 from dmoc.results.solution import Outcome

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.records import dataclass
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem
 from dmoc.shots.equinoctial import Elements

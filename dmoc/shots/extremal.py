@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.basics.records import dataclass
 from dmoc.effects.base import Attractor
 from dmoc.motion.dynamics import Dynamics
 from dmoc.scene.problem import TransferProblem

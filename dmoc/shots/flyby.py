@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.records import dataclass
 from dmoc.scene.problem import TransferProblem
 from dmoc.shots.extremal import Extremal, Shot
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 
 import casadi as ca
@@ -12,6 +12,7 @@ from numpy.polynomial import chebyshev
 
 from dmoc.basics.memory import remembered
 from dmoc.basics.numerics import adams
+from dmoc.basics.records import dataclass
 from dmoc.scene.problem import TransferProblem
 from dmoc.shots.averaged import PLACES, STEPS, Averaged, Wave
 

@@ -13,7 +13,6 @@ import numpy as np
 from dmoc.diagnosis.cause import Cause
 from dmoc.diagnosis.giving import Remedy
 from dmoc.diagnosis.iterate import refuse_undefined_motion, refuse_undefined_rows, worst_in_units
-from dmoc.diagnosis.search import confirmed_cause, lacks_propellant
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.ipopt.options import advice_of, barrier_from, ipopt_alone
@@ -82,8 +81,11 @@ class Ladder:
         known = starting_guess(self.problem, meshes[0], order, first.hold, given) if anew else first
         refuse_undefined_motion(self.dynamics, self.problem, known)
         last = self._last
-        if last and not last.solved and (cause := lacks_propellant(self.problem, known, self)):
-            return replace(last, cause=cause)
+        if last and not last.solved:
+            from dmoc.diagnosis.search import lacks_propellant
+
+            if cause := lacks_propellant(self.problem, known, self):
+                return replace(last, cause=cause)
         if first.multipliers:
             return self._explained(self.solve_on(first), first, None, None)
         cause, curved = None, is_curved(self.problem, first)
@@ -140,21 +142,21 @@ class Ladder:
 
     def _unexplained(self, rung: Rung) -> bool:
         """Whether an attempt failed without a reason; one that the user cut short has a reason."""
-        told = self._limited or (rung.cause is not None and rung.cause.words())
-        return rung.answer.status in UNEXPLAINED and not told
+        return rung.answer.status in UNEXPLAINED and not (self._limited or (rung.cause and rung.cause.words()))
 
     def _explained(self, rung: Rung, start: DiscretePath, rounding: float | None, known: Cause | None) -> Rung:
         """A failed attempt with its cause; if the search for it finds a path, the answer from there."""
         rung = replace(rung, cause=known)
         if known is not None or not self._unexplained(rung) or len(start.position) > MOST_EXPLAINED:
             return rung
+        from dmoc.diagnosis.search import confirmed_cause
+
         problem = rounded(self.problem, rounding)
         cause = confirmed_cause(problem, start, self.tell, self.interrupt, self.problem)
         if self.interrupt.seen:
             return replace(rung, answer=replace(rung.answer, status="stopped"))
-        if cause.path is None:
-            return replace(rung, cause=cause)
-        return self.solve_on(cause.path, rounding, MOST_TRYING)
+        found = cause.path
+        return replace(rung, cause=cause) if found is None else self.solve_on(found, rounding, MOST_TRYING)
 
     def try_on(
         self,

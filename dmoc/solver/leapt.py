@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from dmoc.diagnosis.search import confirmed_cause
 from dmoc.guess.past_zones import clear_ways
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import coarse_to_fine
@@ -29,6 +28,7 @@ SAME_OBJECTIVE = 1e-6
 # What a user is told of an answer that was mended, or could not be.
 LEAPT = "the first answer leapt a zone between two nodes: this one was found on a way past the zones"
 FAILED = "the first guess led nowhere: this answer was found on a way past the zones"
+LED = "the first guess led nowhere, and then to a dearer answer: this one was found on a way past the zones"
 
 
 def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refined: bool) -> Rung:
@@ -37,12 +37,16 @@ def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refi
     A path that leaps a zone between two nodes is an optimum of its mesh alone: finer meshes leap faster and
     dearer. So the problem is solved anew from paths around the zones, on the coarsest mesh. The cheapest of
     these answers that cuts no zone on the mesh of the first guess is taken; where the number of steps is open
-    (`refined`), steps that cut one are cut in two first. A failure among zones is treated alike.
+    (`refined`), steps that cut one are cut in two first. A failure among zones is treated alike, and so is an
+    answer found after one: it stays if none of the others costs less.
     """
-    if rung.stopped or not (cuts_of(ladder, rung) if rung.solved else _zones_may_help(ladder, rung)):
+    if rung.stopped:
         return rung
-    finer, grazed = _grazed(ladder, rung) if refined and rung.solved else (rung, False)
-    if grazed or finer.stopped:
+    cut, led = rung.solved and bool(cuts_of(ladder, rung)), rung.solved and _was_led(ladder, rung)
+    if not (cut or led or (not rung.solved and _zones_may_help(ladder, rung))):
+        return rung
+    finer, grazed = _grazed(ladder, rung) if refined and cut else (rung, not cut)
+    if finer.stopped or (grazed and not led):
         return finer
     order, meshes = coarse_to_fine(ladder.problem, first)
     base = starting_guess(ladder.problem, meshes[0], order, first.hold, given)
@@ -57,13 +61,25 @@ def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refi
         if found[-1].stopped:
             return found[-1]
         if found[-1].solved and not cuts_of(ladder, found[-1]):
-            return noted(found[-1], LEAPT if rung.solved else FAILED)
+            if grazed and found[-1].cost >= finer.cost:
+                return finer
+            return noted(found[-1], (LED if grazed else LEAPT) if rung.solved else FAILED)
     best = min([rung, *found], key=lambda one: _deepest(ladder, one))
     return _blamed(ladder, best, base) if best.solved else best
 
 
+def _was_led(ladder: Ladder, rung: Rung) -> bool:
+    """Whether the answer was found among zones after a failure that nothing explained."""
+    failed = any(
+        one.answer.status in UNEXPLAINED and not one.level.question for one in ladder.rungs[: rung.number]
+    )
+    return failed and any(np.isfinite(zone.feature()) for zone in ladder.problem.constraints)
+
+
 def _blamed(ladder: Ladder, leap: Rung, guess: DiscretePath) -> Rung:
     """A leap as the failure that it is, if zones leave no way and it is known what must give way."""
+    from dmoc.diagnosis.search import confirmed_cause
+
     cause = confirmed_cause(ladder.problem, guess, ladder.tell, ladder.interrupt)
     if not (cause.zones and cause.needs) or ladder.interrupt.seen:
         return leap

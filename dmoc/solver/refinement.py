@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.meshes.cut_off import CutOff, cut_off
 from dmoc.meshes.cuts import PARTS, SHORTEST, cut, cuts_of
 from dmoc.motion.path import DiscretePath

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from dmoc.basics.digits import lasting
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import MANY_TURNS, controls_for, with_mass
 from dmoc.guess.open_ends import end_estimates, swings
 from dmoc.guess.shot import least_effort_to_orbit

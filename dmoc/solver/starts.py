@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.digits import lasting
 from dmoc.basics.quaternions import times, turned_by
+from dmoc.basics.records import dataclass
 from dmoc.guess.coast import VERY_MANY_TURNS
 from dmoc.guess.open_ends import OTHER_TURNS, with_more_turns
 from dmoc.guess.past_zones import ways_past

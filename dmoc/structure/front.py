@@ -7,14 +7,12 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from dmoc.basics.arguments import short
-from dmoc.basics.files import as_path
 from dmoc.basics.memory import unchanged
 from dmoc.checks import verification
 from dmoc.checks.verification import Report
 from dmoc.ipopt.run import one_clock
 from dmoc.nlp.solving import Progress
 from dmoc.results import solution as transfers
-from dmoc.results.netcdf import format_of
 from dmoc.results.solution import Solution
 from dmoc.scene.named import attached_as_named
 from dmoc.scene.problem import TransferProblem
@@ -155,7 +153,7 @@ def solve(
         that it raises ends the solve and is raised by it.
     compiled : bool
         Evaluate the functions of nodes and steps as machine code. The C compiler takes a second or two
-        once for a scene and order, then the library is kept (`dmoc.basics.compiled`); it pays in scenes with
+        once for a scene and order, then the library is kept (`dmoc.assembly.compiled`); it pays in scenes with
         several effects and in repeated solves. Without a compiler nothing changes.
     time_limit : float
         Seconds after which the solve ends, at the next iteration, with the answer on the last mesh that was
@@ -273,6 +271,8 @@ verify.__doc__ = (verification.verify.__doc__ or "").replace(
 
 
 def load(path: str | os.PathLike) -> Any:
+    from dmoc.results.netcdf import as_path, format_of
+
     kind = format_of(path) if as_path(path).is_file() else None
     if kind == TEAM:
         from dmoc.teams.solution import read_team

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from statistics import median
@@ -14,6 +13,7 @@ import numpy as np
 
 from dmoc.basics.arguments import number
 from dmoc.basics.memory import forget
+from dmoc.basics.records import dataclass
 from dmoc.guess.starting import starting_guess
 from dmoc.meshes.choices import guess_on
 from dmoc.motion.dynamics import Dynamics

@@ -7,12 +7,12 @@ import re
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from statistics import median
 
-from dmoc.basics.compiled import compiler, folder, usable_cores
+from dmoc.assembly.compiled import compiler, folder, usable_cores
 from dmoc.basics.memory import forget
+from dmoc.basics.records import dataclass
 from dmoc.scene.problem_file import load_problem
 from dmoc.solver.solve import solve
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, of_kind, whole
 from dmoc.basics.numerics import coefficients, columns
+from dmoc.basics.records import dataclass
 from dmoc.effects.gravity import PointGravity
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from dmoc.basics.docstrings import documented
+from dmoc.basics.records import dataclass
 from dmoc.effects.atmosphere import Drag, ExponentialAtmosphere
 from dmoc.effects.base import Effect
 from dmoc.effects.gravity import J2

@@ -7,7 +7,6 @@ import runpy
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.ipopt.options import settings_for, tolerance
 from dmoc.ipopt.run import make_solver, status_of

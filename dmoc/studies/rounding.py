@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import number
+from dmoc.basics.records import dataclass
 from dmoc.effects.gravity import PointGravity, Spring
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics

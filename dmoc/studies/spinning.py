@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import casadi as ca
@@ -12,6 +11,7 @@ import numpy as np
 
 from dmoc.basics.arguments import number, of_kind, whole
 from dmoc.basics.quaternions import rotated
+from dmoc.basics.records import dataclass
 from dmoc.bodies.torques import Torque
 from dmoc.effects.bodies import PivotGravity
 from dmoc.ends.poses import Attitude, rotation

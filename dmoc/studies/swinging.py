@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import number, of_kind, whole
+from dmoc.basics.records import dataclass
 from dmoc.configurations.of_problem import configuration_of
 from dmoc.effects.gravity import UniformGravity
 from dmoc.ends.base import State

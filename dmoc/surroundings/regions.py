@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.links.holonomic import Holonomic
 from dmoc.parts.constraint import Constraint
 from dmoc.results.solution import Solution

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dmoc.basics.files import AGAIN
+from dmoc.basics.records import dataclass
 from dmoc.results.netcdf import Format, format_of, one_line, read_table, write_table
 from dmoc.sweeps.plan import Plan
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from dmoc.basics.records import dataclass
 from dmoc.scene.problem_file import Parameter, ProblemFile
 
 # A sweep has at most this many points: with solves of 0.1 s they take a day of one core, and a typing error in

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dmoc.assembly.compiled import usable_cores
 from dmoc.basics.arguments import number, short
-from dmoc.basics.compiled import usable_cores
 from dmoc.scene.problem_file import ProblemFile, load_problem
 from dmoc.sweeps.data import FLIGHTS, PATH, as_attributes, sweep_dataset, write_sweep
 from dmoc.sweeps.journal import Journal

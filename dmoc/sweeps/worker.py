@@ -12,11 +12,11 @@ import json
 import threading
 import time
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from dmoc.basics.plain import unbroken
+from dmoc.basics.records import dataclass
 from dmoc.scene.problem_file import ProblemFile, load_problem
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dmoc import solve
-from dmoc.basics import compiled as module
-from dmoc.basics.compiled import compiled, folder
+from dmoc.assembly import compiled as module
+from dmoc.assembly.compiled import compiled, folder
 from dmoc.basics.memory import forget
 from dmoc.nlp.stencils import stencils_of
 from dmoc.scene.problem_file import load_problem

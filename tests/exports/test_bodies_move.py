@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dmoc import Attitude, Pose, Thrusters, Torque, TransferProblem, Wrench, export, rotation
-from dmoc.basics.compiled import compiler
+from dmoc.assembly.compiled import compiler
 from dmoc.basics.quaternions import rotated, times, turned_by
 from dmoc.exports.export import functions_of
 from dmoc.planners.planner import Planner, nominal, solver

@@ -7,12 +7,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmoc import BoxForce, CircularOrbit, KeepIn, PointGravity, State, TransferProblem, solve
+from dmoc import (
+    BallForce,
+    BoxForce,
+    CircularOrbit,
+    Effort,
+    Engine,
+    Fuel,
+    KeepIn,
+    PointGravity,
+    State,
+    TransferProblem,
+    UniformGravity,
+    solve,
+)
 from dmoc.guess.chart import chart_of, is_curved
 from dmoc.guess.starting import starting_guess
 from dmoc.motion.mesh import uniform_mesh
 from dmoc.motion.path import COSTATE
 from dmoc.nlp.layout import Curved
+from dmoc.nlp.stencils import stencils_of
 from dmoc.nlp.transcription import transcribe_onto
 from dmoc.nlp.units import units_of
 from dmoc.scene.problem_file import load_problem
@@ -103,3 +117,60 @@ def test_many_revolutions_take_few_iterations(revolutions):
     """In the axes of the scene a hundred of them take 48."""
     solution = solve(load_problem("geo_raise").make(revolutions=revolutions)).raise_for_status()
     assert sum(level.iterations for level in solution.ladder) <= 12
+
+
+class Northward(Effort):
+    """An effort of which a force to the north costs twice: it sees where the force points."""
+
+    def rate(self, actuator, t, q, v, u, m):
+        return super().rate(actuator, t, q, v, u, m) + 0.5 * u[1] ** 2
+
+
+def leaving(radius, effects, **parts):
+    """From a circle around an attractor that is not at the origin."""
+    start = State((radius + 0.2, 0.0, 0.3), (0.0, radius**-0.5, 0.1))
+    return TransferProblem(1.0, start, State((0.2, 1.1, 0.3), (-1.0, 0.0, 0.0)), 60.0, effects, **parts)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        plane(),
+        plane(actuator=Engine(1e-2, exhaust_velocity=3.0), objective=Fuel()),
+        plane(objective=Northward()),
+        leaving(1.0, [PointGravity(1.0, center=(0.2, 0.0, 0.3)), UniformGravity((1e-3, 0.0, 2e-3))]),
+        CASE["problem"](days=1.0, limit=0.2),
+    ],
+)
+def test_rows_and_cost_are_those_of_the_plain_unknowns(problem):
+    """At any path near the one they are counted from, every row of motion turned into the frame of its node."""
+    guess, units, chart = charted(problem)
+    assert chart is not None
+    plain, bent = (transcribe_onto(problem, guess, units, chart=one) for one in (None, chart))
+    curved = Curved(chart, plain.columns, plain.rows)
+    draw = np.random.default_rng(2)
+    y = curved.unknowns(plain.pack(guess)) + 0.02 * draw.normal(size=plain.columns.size)
+    place = plain.columns["position"]
+    frames = chart.frames((place.of(y) * place.scales)[:, 1] / chart.reach)
+    found = []
+    for nlp, at in ((plain, curved.path(y)), (bent, y)):
+        numbers = nlp.parameters(problem)
+        cost, rows = (
+            np.array(of(at, numbers)).ravel() for of in (nlp.assembly.objective, nlp.assembly.constraints)
+        )
+        found.append((cost, curved.rotated(rows, frames) if nlp is bent else rows))
+    (cost, rows), (same, turned) = found
+    assert same == pytest.approx(cost, rel=1e-12)
+    assert turned == pytest.approx(rows, abs=1e-12 * np.abs(rows).max())
+
+
+def test_only_what_sees_a_direction_is_turned_into_the_axes_of_the_scene():
+    """In the frame of its node a force has one entry a row of motion; in the axes of the scene it has more."""
+
+    def entries(problem):
+        node = stencils_of(problem, 8, False, curved=True).stencils[0].kernel
+        return node.jacobian.nnz(), node.hessian.nnz()
+
+    assert entries(plane()) == (3, 3)
+    assert entries(plane(actuator=BallForce(1.0)))[0] == 5
+    assert entries(plane(objective=Northward()))[0] > 5

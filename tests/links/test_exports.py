@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dmoc import export, simulate, solve
-from dmoc.basics.compiled import compiler
+from dmoc.assembly.compiled import compiler
 from dmoc.scene.problem_file import load_problem
 
 

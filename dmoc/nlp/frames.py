@@ -1,0 +1,50 @@
+"""Whether controls are the same in every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+# Two results are the same up to this part of their size [-]: rounding leaves some 1e-15.
+SAME = 1e-9
+# Turned by this angle [rad] over and over a vector comes as near as one likes to every direction of the plane.
+ANGLE = 1.0
+# Functions that agree at so many random places agree: those of a scene are smooth.
+PLACES = 3
+
+
+def are_alike(acts: Callable[[Any], Any], tells: Callable[[Any], Any], controls: int, axes: int) -> bool:
+    """Whether a control whose first `axes` entries are turned acts turned, and all that is told of it stays.
+
+    Parameters
+    ----------
+    acts : callable
+        The force of a control, a column for a column of symbols.
+    tells : callable
+        A column of what else depends on it: what it burns and costs.
+    controls, axes : int
+        Entries of a control, and how many of them are a vector.
+    """
+    u = ca.SX.sym("u", controls)
+    left = []
+    for first in range(axes - 1):
+        turn = _turn(axes, first)
+        turned = ca.vertcat(turn @ u[:axes], u[axes:])
+        left += [turn @ acts(u) - acts(turned), tells(u) - tells(turned)]
+    sizes = ca.vertcat(acts(u), tells(u))
+    symbols = ca.vertcat(*ca.symvar(ca.veccat(u, *left, sizes)))
+    function = ca.Function("left", [symbols], [ca.densify(ca.vertcat(*left)), ca.densify(sizes)])
+    places = np.random.default_rng(0).uniform(0.5, 1.5, (symbols.numel(), PLACES))
+    gaps, sizes = (np.array(result) for result in function(places))
+    return bool(np.abs(gaps).max() <= SAME * np.abs(sizes).max())
+
+
+def _turn(axes: int, first: int) -> ca.DM:
+    """The turn of two axes that follow each other."""
+    turn = np.eye(axes)
+    cos, sin = np.cos(ANGLE), np.sin(ANGLE)
+    turn[first : first + 2, first : first + 2] = [[cos, -sin], [sin, cos]]
+    return ca.DM(turn)
