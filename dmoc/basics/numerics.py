@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from typing import Any
 
 import casadi as ca
@@ -255,3 +256,27 @@ def _dense(values: np.ndarray, sparsity: ca.Sparsity) -> np.ndarray:
         full[:, sparsity.find()] = values
         values = full
     return values.reshape(len(values) * across, rows).T
+
+
+def coefficients() -> tuple[np.ndarray, ...]:
+    """DOP853's places, slopes and weights of its stages, and weights of its third and fifth order errors.
+
+    They are SciPy's. Its integrators take as long to import as a small solve, so their table is read alone.
+    """
+    try:
+        table = _scipys_table()
+        stages = len(table.B)
+        return table.C[:stages], table.A[:stages, :stages], table.B, table.E3, table.E5
+    except (AttributeError, ImportError, OSError):
+        from scipy.integrate import DOP853
+
+        return DOP853.C, DOP853.A, DOP853.B, DOP853.E3, DOP853.E5
+
+
+def _scipys_table() -> Any:
+    """SciPy's module of coefficients, which holds numbers alone, loaded without the package around it."""
+    folder = find_spec("scipy").submodule_search_locations[0]  # type: ignore[union-attr, index]
+    spec = spec_from_file_location("dop853", f"{folder}/integrate/_ivp/dop853_coefficients.py")
+    table = module_from_spec(spec)  # type: ignore[arg-type]
+    spec.loader.exec_module(table)  # type: ignore[union-attr]
+    return table

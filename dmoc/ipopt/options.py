@@ -33,8 +33,9 @@ SURE, LEAST_ROUNDING = 3e-7, 0.2
 # On more steps less than the rounding is not reached: 200,000 took 4 iterations, not 1, and a million 17.
 MOST_SURE = 10_000
 # Over very many revolutions propellant hardly depends on where it is burnt: the barrier begins with this
-# parameter [-], at which that little counts. From 1e-6 or 1e-4 on it takes 45 iterations, not 25.
-FLAT = 1e-9
+# parameter [-], at which that little counts. From 1e-6 or 1e-4 on it takes 45 iterations, not 25. It is left at
+# the limit of every node, and what that adds up to must not grow with their number: it is so much in all.
+FLAT, FLAT_IN_ALL = 1e-9, 5e-6
 
 
 # A mesh follows a fall past an attractor if its longest step is so many times its shortest one [-].
@@ -122,12 +123,13 @@ def settings_for(
     ):
         # The guess is the optimum but for the mesh. A barrier of the usual size leads it away by revolutions,
         # and over 97 of them in low orbit Ipopt does not come back; from 1e-6 it takes ten iterations.
-        size = FLAT if curved and _meters(problem) else 1e-6
+        flat = curved and _meters(problem)
+        size = min(FLAT, FLAT_IN_ALL / (degree * (len(mesh) - 1))) if flat else 1e-6
         settings |= dict.fromkeys(NEAR, size)
-        if size == FLAT:
+        if flat:
             # The answer is that at this barrier: a lower one took 35 of 64 iterations, or 105 of 150 that led
             # nowhere, for 3e-6 of the propellant at most.
-            settings["ipopt.mu_target"] = FLAT
+            settings["ipopt.mu_target"] = size
     if _falls_past(problem, mesh) and not warm and not _meters(problem):
         # As there: the guess is the path of least effort, and past an attractor Ipopt does not come back to it.
         settings |= dict.fromkeys(NEAR, 1e-6)
@@ -157,9 +159,9 @@ def _linear_solver(problem: TransferProblem, curved: bool) -> dict[str, Any]:
         settings["ipopt.mumps_scaling"] = 8
         if problem.free_duration and problem.actuator == problem.actuator.throughout:
             # A free duration stands in every row of motion: pivots that are small beside it are delayed, and
-            # three iterations on 700 steps took 49 s, like this 2 s. From 1e-13 on steps are so wrong that
-            # Ipopt sees negative curvature.
-            settings |= {"ipopt.mumps_pivtol": 1e-9, "ipopt.mumps_pivtolmax": 1e-8}
+            # three iterations on 700 steps took 49 s, like this 1 s. Where the place of arrival hardly counts,
+            # 1e-9 makes steps so wrong that Ipopt sees negative curvature: 65 iterations, and not 13.
+            settings |= {"ipopt.mumps_pivtol": 1e-7, "ipopt.mumps_pivtolmax": 1e-6}
             # The guess is the answer but for the mesh, and so are the multipliers that follow from it, however
             # large: Ipopt would begin with none, and far off.
             settings["ipopt.constr_mult_init_max"] = 1e10

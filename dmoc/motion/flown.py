@@ -2,11 +2,11 @@
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
 equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
-within the limit: the polynomial at the size of the limit throughout, where a thrust turns at its limit;
-elsewhere the polynomial drawn towards its mean; two constant pieces, for one switch; or the value of each node
-for as long as its weight, for more. Of these each step has the one that keeps most of the control's first two
-moments about its middle, as they move the body. The limits are convex sets: the mean of the node values with
-the scheme's weights obeys them. No impulse is flown that is not paid for.
+within the limit: the polynomial at the size of the limit, where a thrust turns at its limit; or pieces near it
+where the direction is free; or, by which of them keeps most of the first two moments about the middle of the
+step, the polynomial drawn towards its mean, two constant pieces, or the value of each node for as long as its
+weight. The limits are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse
+is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ LOOKED_AT = np.linspace(0.0, 1.0, 17)
 # Places at which a polynomial that is drawn in is held against the limit: between them it exceeds it by less
 # than a hundred-thousandth.
 CLOSELY = np.linspace(0.0, 1.0, 129)
-# A thrust is at its limit at a node if it is so by this part of it [-].
-FULL = 1e-6
+FULL = 1e-6  # a thrust is at its limit at a node if it is so by this part of it [-]
 # Pieces of a step in which a thrust at its limit turns: in each its size swings by less than a thousandth of
 # what it does in the whole step.
 TURNING = np.linspace(0.0, 1.0, 5)
 # Fractions of a step at which two constant pieces may meet.
 MEETINGS = np.linspace(0.02, 0.98, 49)
-# Halvings of the interval for how far apart the pieces may be: to a millionth.
-HALVINGS = 21
+HALVINGS = 21  # of the interval for how far apart the pieces may be: to a millionth
+# A force of free direction has so many pieces near its polynomial, by so many projections at most: until its
+# first moment is right to this part of the limit [-]. After 300 revolutions with 1,200 switches 8 pieces miss
+# the goal by 0.004 of the path, the other ways by 0.05.
+NEAREST_PIECES, PROJECTIONS, RIGHT = 8, 60, 1e-6
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,9 @@ def _mended(
     turns, bounds, pieces = _turning(dynamics, rule, values, path.place.shape[1])
     best, ways = np.zeros(values.shape[1], int), [(bounds, pieces)]
     if not turns.all():
-        ways += [way(dynamics, rule, values) for way in (_drawn_in, _two_pieces, _node_pieces)]
+        tied = dynamics.actuator.nearest(values[0]) is None
+        others = (_drawn_in, _two_pieces, _node_pieces) if tied else (_nearest,)
+        ways += [way(dynamics, rule, values) for way in others]
         whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
         wanted = _moments(rule, whole, values[:, None])
         off = [np.abs(_moments(rule, *way) - wanted).sum(axis=(0, 2)) for way in ways]
@@ -185,6 +189,28 @@ def _node_pieces(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[
     bounds[-1] = 1.0
     bounds = np.broadcast_to(bounds, (values.shape[1], len(bounds)))
     return bounds, np.broadcast_to(pieces, (len(values), *values.shape))
+
+
+def _nearest(dynamics: Dynamics, rule: Scheme, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Polynomial pieces near the polynomial, by projections in turn onto the limit and onto both moments."""
+    ends = np.linspace(0.0, 1.0, NEAREST_PIECES + 1)
+    at = (ends[:-1] + rule.points[:, None] / NEAREST_PIECES).ravel()
+    weights = np.repeat(rule.weights, NEAREST_PIECES) / NEAREST_PIECES
+    basis, known = (np.stack([np.ones(len(x)), np.sqrt(12) * (x - 0.5)]) for x in (at, rule.points))
+    wanted = np.einsum("mj,jkn->mkn", known * rule.weights, values)
+    found, left = np.einsum("pj,jkn->pkn", rule.values_at(at), values), np.arange(values.shape[1])
+    for _ in range(PROJECTIONS):
+        near = dynamics.actuator.nearest(found[:, left].reshape(-1, values.shape[2]))
+        found[:, left] = near.reshape(len(at), -1, values.shape[2])  # type: ignore[union-attr]
+        off = wanted[:, left] - np.einsum("mp,pkn->mkn", basis * weights, found[:, left])
+        wrong = np.abs(off).max(axis=(0, 2)) > RIGHT * (dynamics.actuator.main_limit() or 1.0)
+        found[:, left] += np.einsum("mp,mkn->pkn", basis, off * wrong[:, None])
+        left = left[wrong]
+    mean = wanted[0]
+    pieces = (found - np.einsum("p,pkn->kn", weights, found)).reshape(-1, NEAREST_PIECES, *mean.shape)
+    looked = np.einsum("pj,jikn->pikn", rule.values_at(LOOKED_AT), pieces).reshape(-1, 1, *mean.shape)
+    pieces = mean + _share_within(dynamics, mean, looked)[0][:, None] * pieces
+    return np.broadcast_to(ends, (len(mean), len(ends))), pieces
 
 
 def _share_within(dynamics: Dynamics, mean: np.ndarray, apart: np.ndarray) -> np.ndarray:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from dmoc.basics.memory import remembered
+from dmoc.basics.numerics import coefficients
 from dmoc.basics.quaternions import conjugate, rotation_vectors
 from dmoc.basics.quaternions import times as multiplied
 from dmoc.configurations.coordinates import ATTITUDE, Coordinates
@@ -20,11 +19,9 @@ from dmoc.motion.path import DiscretePath
 from dmoc.motion.scales import least_extent, path_scales
 from dmoc.motion.step import weighted
 
-# The independent integrator gives up if the steps of a path need more parts than this in all: such a path runs
-# into a singularity.
+# It gives up if the steps of a path need more parts than this in all: such a path runs into a singularity.
 MOST_PARTS = 1_000_000
-# The independent integrator may miss the goal by this part of the path [-] if no tolerance was asked for: a
-# mesh that is too coarse for its motion misses by more.
+# It may miss the goal by this part of the path [-] where no tolerance is asked for: coarse meshes miss by more.
 MISSED = 1e-2
 
 
@@ -165,27 +162,3 @@ def _dop853(dynamics: Dynamics, size: int) -> ca.Function:
     # SciPy's combination of both estimates; 1e-300 avoids 0 / 0 where nothing moves.
     error = length * fifth / ca.sqrt((fifth + 0.01 * third) * state.numel() + 1e-300)
     return ca.Function("dop853", [state, powers, t, h, begin, share, origin, tolerances], [after, error])
-
-
-def coefficients() -> tuple[np.ndarray, ...]:
-    """DOP853's places, slopes and weights of its stages, and weights of its third and fifth order errors.
-
-    They are SciPy's. Its integrators take as long to import as a small solve, so their table is read alone.
-    """
-    try:
-        table = _scipys_table()
-        stages = len(table.B)
-        return table.C[:stages], table.A[:stages, :stages], table.B, table.E3, table.E5
-    except (AttributeError, ImportError, OSError):
-        from scipy.integrate import DOP853
-
-        return DOP853.C, DOP853.A, DOP853.B, DOP853.E3, DOP853.E5
-
-
-def _scipys_table() -> Any:
-    """SciPy's module of coefficients, which holds numbers alone, loaded without the package around it."""
-    folder = find_spec("scipy").submodule_search_locations[0]  # type: ignore[union-attr, index]
-    spec = spec_from_file_location("dop853", f"{folder}/integrate/_ivp/dop853_coefficients.py")
-    table = module_from_spec(spec)  # type: ignore[arg-type]
-    spec.loader.exec_module(table)  # type: ignore[union-attr]
-    return table

@@ -265,6 +265,13 @@ class Actuator(Duties):
         """
         return self.excess(u)
 
+    def nearest(self, u: np.ndarray) -> np.ndarray | None:
+        """Controls between nodes within what it can do, near the given ones of shape (count, size).
+
+        None where it does not tell.
+        """
+        return None
+
     def words(self) -> str:
         """One line for a person."""
         return "any force, without a limit"

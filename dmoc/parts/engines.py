@@ -173,6 +173,15 @@ class Engine(Burner):
         # What is flown must have been paid for.
         return np.maximum(0.0, np.maximum(over, thrust - throttle))
 
+    def nearest(self, u: np.ndarray) -> np.ndarray | None:
+        if self.box is not None:
+            return None
+        throttle = np.clip(u[:, -1:], self.min_thrust, self.max_thrust)
+        thrust = np.linalg.norm(u[:, :-1], axis=1, keepdims=True)
+        # Nothing is divided by a force of zero.
+        share = np.minimum(1.0, throttle / np.maximum(thrust, np.finfo(float).tiny))
+        return np.hstack([share * u[:, :-1], throttle])
+
     def words(self) -> str:
         if self.min_thrust == self.max_thrust:
             return f"an engine that burns at {self.max_thrust:g} N throughout{self._burning_words()}"

@@ -175,6 +175,9 @@ class BallForce(Actuator):
         # Between nodes at which it is full a force that turns is a little less.
         return np.maximum(0.0, np.linalg.norm(u, axis=1) - self.limit)
 
+    def nearest(self, u: np.ndarray) -> np.ndarray:
+        return u * (self.limit / np.maximum(np.linalg.norm(u, axis=1), self.limit))[:, None]
+
     def words(self) -> str:
         if self.full:
             return f"a force in any direction of {self.limit:g} N throughout"

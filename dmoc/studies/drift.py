@@ -10,13 +10,12 @@ import casadi as ca
 import numpy as np
 
 from dmoc.basics.arguments import entries, number, of_kind, whole
-from dmoc.basics.numerics import columns
+from dmoc.basics.numerics import coefficients, columns
 from dmoc.basics.records import dataclass
 from dmoc.effects.gravity import PointGravity
 from dmoc.ends.base import State
 from dmoc.motion.dynamics import Dynamics
 from dmoc.motion.lobatto import scheme
-from dmoc.motion.reference import coefficients
 from dmoc.motion.step import step_map, weighted
 from dmoc.scene.problem import TransferProblem
 
