@@ -6,12 +6,11 @@ import pytest
 from scipy.integrate import DOP853, solve_ivp
 
 from dmoc import PointGravity, RotatingFrame, Spring, State, ThirdBody, TransferProblem
-from dmoc.basics.numerics import root
+from dmoc.basics.numerics import coefficients, root
 from dmoc.configurations.base import Translation
 from dmoc.guess.coast import coast
 from dmoc.guess.spiral import Spiral
 from dmoc.motion.dynamics import Dynamics
-from dmoc.motion.reference import coefficients
 
 GRAVITY = (PointGravity(1.0),)
 
@@ -124,6 +123,6 @@ def test_the_reference_integrator_has_scipys_coefficients():
 def test_the_reference_integrator_does_without_scipys_file(monkeypatch):
     """It is an inner one: where a later SciPy has it elsewhere, the public class gives the same."""
     before = coefficients()
-    monkeypatch.setattr("dmoc.motion.reference.spec_from_file_location", lambda *_: None)
+    monkeypatch.setattr("dmoc.basics.numerics.spec_from_file_location", lambda *_: None)
     for ours, theirs in zip(coefficients(), before, strict=True):
         np.testing.assert_array_equal(ours, theirs)
