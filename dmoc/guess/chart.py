@@ -105,7 +105,7 @@ def pulled(number: Callable[[str], Any], place: Any, mu: Any) -> Any:
     """E^T of the attractor's pull per mass [m/s^2] on a node, from its unknowns: the axis goes through it.
 
     In this frame it is free of the angle. In the scene's own axes a node has 467 instructions for its second
-    derivatives and 8 entries of them; so it has 49 and 3.
+    derivatives and 8 entries of them; so it has 53 and 3.
     """
     out, up = number("reach") + place[0], number("height") + place[2] if place.numel() == 3 else 0.0
     square = out**2 + up**2

@@ -50,8 +50,7 @@ class Draft:
         unknowns = self.take("position", n, at)
         if not self.writer.curved:
             return unknowns, ca.DM.eye(n)
-        place, frame = drafted(lambda name: self.number(name, at), unknowns)
-        return self.between([place])[0], frame
+        return drafted(lambda name: self.number(name, at), unknowns)
 
     def pulled(self, mu: Any) -> ca.SX:
         """The pull of the attractor at the node of a curved place, in the frame there."""
@@ -90,8 +89,7 @@ class Draft:
     def between(self, known: list) -> list:
         """Symbols that stand for some columns in the rows: see `kernel`."""
         symbols = [ca.SX.sym(f"between_{i}", column.numel()) for i, column in enumerate(known)]
-        former = self._between or (ca.SX(0, 1), ca.SX(0, 1))
-        self._between = ca.vertcat(former[0], *symbols), ca.vertcat(former[1], *known)
+        self._between = ca.vertcat(*symbols), ca.vertcat(*known)
         return symbols
 
     def add(self, group: str, rows: ca.SX, at: slice = ALL) -> None:

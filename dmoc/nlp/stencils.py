@@ -137,6 +137,7 @@ class Writer:
         # nodes[j] picks the j-th node of every step out of all steps * s + 1 nodes.
         nodes = [slice(j, j - rule.degree or None, rule.degree) for j in range(rule.degree + 1)]
         r, frames = map(list, zip(*(draft.place(at) for at in nodes), strict=True))
+        r = draft.between(r) if self.curved else r
         duration, costly = draft.duration(), self._cost_in_steps() or problem.actuator.burns
         begin, length = draft.number("begin"), draft.number("length")
         h, m = length * duration, [draft.mass(at) for at in nodes]
