@@ -12,8 +12,8 @@ import numpy as np
 SAME = 1e-9
 # Turned by this angle [rad] over and over a vector comes as near as one likes to every direction of the plane.
 ANGLE = 1.0
-# Functions that agree at a place for each of these agree: those of a scene are smooth. Multiples of a number that
-# is no fraction fall anywhere between whole ones, and to draw numbers at random takes 17 ms to import.
+# Functions that agree at a place for each of these agree: those of a scene are smooth. Multiples of a number
+# that is no fraction fall anywhere between whole ones; to draw numbers at random takes 17 ms to import.
 SPREAD = np.sqrt([2.0, 3.0, 5.0])
 
 
