@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from inspect import get_annotations
+from operator import attrgetter
 from reprlib import recursive_repr
 from types import MethodType
 from typing import TYPE_CHECKING, Any
@@ -102,8 +103,8 @@ def _methods(kind: Any) -> dict[str, Callable]:
     """What the standard library would compile, as functions that go through the fields."""
     fields = dataclasses.fields(kind)
     shown = [one.name for one in fields if one.repr]
-    compared = [one.name for one in fields if one.compare]
-    hashed = [one.name for one in fields if (one.compare if one.hash is None else one.hash)]
+    compared = _values([one.name for one in fields if one.compare])
+    hashed = _values([one.name for one in fields if (one.compare if one.hash is None else one.hash)])
 
     def show(self: Any) -> str:
         told = ", ".join(f"{name}={getattr(self, name)!r}" for name in shown)
@@ -112,10 +113,10 @@ def _methods(kind: Any) -> dict[str, Callable]:
     def equal(self: Any, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return [getattr(self, name) for name in compared] == [getattr(other, name) for name in compared]
+        return compared(self) == compared(other)
 
     def number(self: Any) -> int:
-        return hash(tuple([getattr(self, name) for name in hashed]))
+        return hash(hashed(self))
 
     def put(self: Any, name: str, value: Any) -> None:
         if type(self) is kind or name in kind.__dataclass_fields__:
@@ -137,6 +138,12 @@ def _methods(kind: Any) -> dict[str, Callable]:
     for name, method in methods.items():
         method.__name__, method.__qualname__ = name, f"{kind.__qualname__}.{name}"
     return methods
+
+
+def _values(names: list[str]) -> Callable[[Any], tuple]:
+    """A function that gives the values of an object's fields."""
+    # That of the standard library gives the value itself where there is one name.
+    return attrgetter(*names) if len(names) > 1 else lambda self: tuple(getattr(self, name) for name in names)
 
 
 # Type checkers know the decorator of the standard library, and this one does the same.
