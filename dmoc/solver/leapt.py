@@ -45,7 +45,7 @@ def past_zones(ladder: Ladder, rung: Rung, first: DiscretePath, given: Any, refi
     cut, led = rung.solved and bool(cuts_of(ladder, rung)), rung.solved and _was_led(ladder, rung)
     if not (cut or led or (not rung.solved and _zones_may_help(ladder, rung))):
         return rung
-    finer, grazed = _grazed(ladder, rung) if refined and cut else (rung, not cut)
+    finer, grazed = _grazed(ladder, rung) if refined and cut else (rung, led and not cut)
     if finer.stopped or (grazed and not led):
         return finer
     order, meshes = coarse_to_fine(ladder.problem, first)

@@ -1,9 +1,13 @@
 """An answer that was found after a failure among zones is compared with those past the zones."""
 
+from dataclasses import replace
+
 import pytest
 
 from dmoc import Effort, Engine, KeepOut, State, TransferProblem, solve
-from dmoc.solver.leapt import LED
+from dmoc.meshes.choices import first_path
+from dmoc.solver.ladder import Ladder
+from dmoc.solver.leapt import FAILED, LED, past_zones
 
 
 def test_after_a_failure_among_zones_a_cheaper_way_past_them_is_found():
@@ -16,3 +20,16 @@ def test_after_a_failure_among_zones_a_cheaper_way_past_them_is_found():
     solution = solve(problem, 6, 40).raise_for_status()
     assert solution.objective == pytest.approx(0.4111, rel=2e-3)
     assert LED in solution.warnings
+
+
+def test_a_failure_among_zones_is_followed_by_the_ways_past_them():
+    problem = TransferProblem(
+        1.0, State((0, 0), (0, 0)), State((4, 0), (0, 0)), 4.0, constraints=[KeepOut((2.0, 0.1), 1.0)]
+    )
+    ladder, first = Ladder(problem), first_path(problem, 4, 20, False, None)
+    rung = ladder.climb_to(first)
+    failed = replace(rung, answer=replace(rung.answer, status="iteration limit"))
+    ladder.rungs[-1] = failed
+    found = past_zones(ladder, failed, first, None, refined=False)
+    assert found.solved and FAILED in found.notes
+    assert found.cost == pytest.approx(rung.cost, rel=1e-6)
