@@ -54,7 +54,7 @@ class Draft:
 
     def pulled(self, mu: Any) -> ca.SX:
         """The pull of the attractor at the node of a curved place, in the frame there."""
-        return pulled(lambda name: self.number(name), self._symbols[0], mu)
+        return pulled(self.number, self._symbols[0], mu)
 
     def control(self, frame: Any, at: slice = ALL) -> ca.SX:
         """The controls of a node, whose force is in the frame there; kept in it if it acts alike in all."""
@@ -68,9 +68,10 @@ class Draft:
 
     def number(self, name: str, at: slice = ALL) -> ca.SX:
         """A symbol for a number that the mesh, or the chart, gives to each evaluation."""
-        self._data.append(ca.SX.sym(name))
-        self._numbers.append((name, at))
-        return self._data[-1]
+        if (name, at) not in self._numbers:
+            self._data.append(ca.SX.sym(name))
+            self._numbers.append((name, at))
+        return self._data[self._numbers.index((name, at))]
 
     def mass(self, at: slice) -> ca.SX:
         """The mass at nodes: unknowns if it burns away, one of a leg of a mission, else a parameter."""

@@ -1,12 +1,16 @@
-"""Whether controls are the same in every frame."""
+"""What is the same in every frame: controls that act alike in all, and the pull of a point."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
+
+from dmoc.configurations.acting import point_function, state_symbols
+from dmoc.configurations.base import Configuration
+from dmoc.effects.base import Effect
 
 # Two results are the same up to this part of their size [-]: rounding leaves some 1e-15.
 SAME = 1e-9
@@ -30,14 +34,32 @@ def are_alike(acts: Callable[[Any], Any], tells: Callable[[Any], Any], controls:
         Entries of a control, and how many of them are a vector.
     """
     u = ca.SX.sym("u", controls)
-    left = []
+    plain, turned = [], []
     for first in range(axes - 1):
         turn = _turn(axes, first)
-        turned = ca.vertcat(turn @ u[:axes], u[axes:])
-        left += [turn @ acts(u) - acts(turned), tells(u) - tells(turned)]
-    sizes = ca.vertcat(acts(u), tells(u))
-    symbols = ca.vertcat(*ca.symvar(ca.veccat(u, *left, sizes)))
-    function = ca.Function("left", [symbols], [ca.densify(ca.vertcat(*left)), ca.densify(sizes)])
+        other = ca.vertcat(turn @ u[:axes], u[axes:])
+        plain += [turn @ acts(u), tells(u)]
+        turned += [acts(other), tells(other)]
+    return _agree(ca.vertcat(*plain), ca.vertcat(*turned))
+
+
+def lone_pull(effects: Sequence[Effect], configuration: Configuration) -> tuple[Effect, float] | None:
+    """The effect that is nothing but the pull of a point mass, and its mu: a user's attractor may be more."""
+    t, q, v, m = state_symbols(configuration.size)
+    for one in effects:
+        if (source := one.attractor()) is not None:
+            offset = q - ca.vertcat(*source.place(configuration.size).tolist())
+            pull = -source.mu * offset / ca.norm_2(offset) ** 3
+            acts = ca.vertcat(*point_function((one,), configuration, kinetic=False)(t, q, v, m))
+            if _agree(acts, ca.vertcat(pull, ca.SX.zeros(2 * configuration.size))):
+                return one, source.mu
+    return None
+
+
+def _agree(one: ca.SX, other: ca.SX) -> bool:
+    """Whether two columns are the same whatever the numbers."""
+    symbols = ca.vertcat(*ca.symvar(ca.veccat(one, other)))
+    function = ca.Function("both", [symbols], [ca.densify(one - other), ca.densify(one)])
     places = 0.5 + np.outer(np.arange(1, symbols.numel() + 1), SPREAD) % 1.0
     gaps, sizes = (np.array(result) for result in function(places))
     return bool(np.abs(gaps).max() <= SAME * np.abs(sizes).max())

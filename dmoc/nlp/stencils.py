@@ -23,7 +23,7 @@ from dmoc.motion.lobatto import Scheme, scheme
 from dmoc.motion.path import INNER_MASSES
 from dmoc.motion.step import step_momenta, step_velocities, weighted
 from dmoc.nlp.draft import ALL, Draft
-from dmoc.nlp.frames import are_alike
+from dmoc.nlp.frames import are_alike, lone_pull
 from dmoc.nlp.layout import CONSTRAINT, Owner, Stencil, Stencils
 from dmoc.nlp.lesson import Lesson
 from dmoc.parts.rows import Row, built_in, title, with_symbols
@@ -107,9 +107,9 @@ class Writer:
         resting, _ = split_effects(self.effects, body)
         # What turns with the frame is added in it: there it is free of the angle.
         turning: Any = 0
-        if self.curved:
-            turning = draft.pulled(next(source.mu for one in resting if (source := one.attractor())))
-            resting = tuple(one for one in resting if one.attractor() is None)
+        if self.curved and (pull := lone_pull(resting, body)) is not None:
+            turning = draft.pulled(pull[1])
+            resting = tuple(one for one in resting if one is not pull[0])
         dldq, _, push = point_function(resting, body, kinetic=False)(t, q, ca.DM.zeros(n), m)
         driven = 0 if u is None else body.driven(self.actuator, q, u, m)
         push, turning = (push, turning + driven) if self.alike else (push + driven, turning)

@@ -1,7 +1,7 @@
 """Curved unknowns around an attractor: the same problem, the same answer, fewer iterations."""
 
 import runpy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +126,14 @@ class Northward(Effort):
         return super().rate(actuator, t, q, v, u, m) + 0.5 * u[1] ** 2
 
 
+@dataclass(frozen=True)
+class Lumpy(PointGravity):
+    """An attractor whose field is not that of a point alone: it says that it attracts, and a wave is added."""
+
+    def lagrangian(self, t, q, v, m):
+        return super().lagrangian(t, q, v, m) + 1e-3 * q[0] * q[1]
+
+
 def leaving(radius, effects, **parts):
     """From a circle around an attractor that is not at the origin."""
     start = State((radius + 0.2, 0.0, 0.3), (0.0, radius**-0.5, 0.1))
@@ -138,6 +146,7 @@ def leaving(radius, effects, **parts):
         plane(),
         plane(actuator=Engine(1e-2, exhaust_velocity=3.0), objective=Fuel()),
         plane(objective=Northward()),
+        replace(plane(), effects=[Lumpy(1.0)]),
         leaving(1.0, [PointGravity(1.0, center=(0.2, 0.0, 0.3)), UniformGravity((1e-3, 0.0, 2e-3))]),
         CASE["problem"](days=1.0, limit=0.2),
     ],
@@ -174,3 +183,4 @@ def test_only_what_sees_a_direction_is_turned_into_the_axes_of_the_scene():
     assert entries(plane()) == (3, 3)
     assert entries(plane(actuator=BallForce(1.0)))[0] == 5
     assert entries(plane(objective=Northward()))[0] > 5
+    assert entries(replace(plane(), effects=[Lumpy(1.0)]))[0] > 5
