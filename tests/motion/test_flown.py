@@ -111,7 +111,7 @@ def test_a_thrust_at_its_limit_turns_at_its_limit(order, turn):
 
 
 def test_a_thrust_that_turns_and_stops_keeps_its_first_moment():
-    """What pieces of one direction each lose of it adds up: over 300 revolutions to half a radian."""
+    """What pieces of one direction each lose of it adds up over many revolutions."""
     order = 8
     angle = np.pi / 6 * scheme(order).points
     throttle = np.interp(scheme(order).points, [0.0, 0.4, 0.9], [1.0, 1.0, 0.4])
