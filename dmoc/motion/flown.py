@@ -35,8 +35,8 @@ TURNING = np.linspace(0.0, 1.0, 5)
 MEETINGS = np.linspace(0.02, 0.98, 49)
 HALVINGS = 21  # of the interval for how far apart the pieces may be: to a millionth
 # A force of free direction has so many pieces near its polynomial, by so many projections at most: until its
-# first moment is right to this part of the limit [-]. After 300 revolutions of least fuel 8 pieces miss the goal
-# by 0.0045 of the path, the other ways by 0.050.
+# first moment is right to this part of the limit [-]. After 300 revolutions of least fuel 8 pieces miss the
+# goal by 0.0045 of the path, the other ways by 0.050.
 NEAREST_PIECES, PROJECTIONS, RIGHT = 8, 60, 1e-6
 
 
