@@ -2,11 +2,11 @@
 
 The control of a step is the polynomial through its Lobatto nodes: its integral is the impulse of the discrete
 equations. Where the polynomial breaks the actuator's limit, another control of the same impulse is flown,
-within the limit: the polynomial at the size of the limit, where a thrust turns at its limit; or pieces near it
-where the direction is free; or, by which of them keeps most of the first two moments about the middle of the
-step, the polynomial drawn towards its mean, two constant pieces, or the value of each node for as long as its
-weight. The limits are convex sets: the mean of the node values with the scheme's weights obeys them. No impulse
-is flown that is not paid for.
+within the limit: the polynomial at the size of the limit, where a thrust turns at its limit; or, by which of
+them keeps most of the first two moments about the middle of the step, the polynomial drawn towards its mean,
+two constant pieces, the value of each node for as long as its weight or, where the direction is free, eight
+pieces near the polynomial. The limits are convex sets: the mean of the node values with the scheme's weights
+obeys them. No impulse is flown that is not paid for.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ TURNING = np.linspace(0.0, 1.0, 5)
 MEETINGS = np.linspace(0.02, 0.98, 49)
 HALVINGS = 21  # of the interval for how far apart the pieces may be: to a millionth
 # A force of free direction has so many pieces near its polynomial, by so many projections at most: until its
-# first moment is right to this part of the limit [-]. After 300 revolutions of least fuel 8 pieces miss the
-# goal by 0.0045 of the path, the other ways by 0.050.
+# first moment is right to this part of the limit [-]. After 300 revolutions of least fuel the goal is missed by
+# 0.0037 of the path, without them by 0.050, with them alone by 0.0045.
 NEAREST_PIECES, PROJECTIONS, RIGHT = 8, 60, 1e-6
 
 
@@ -104,8 +104,9 @@ def _mended(
     turns, bounds, pieces = _turning(dynamics, rule, values, path.place.shape[1])
     best, ways = np.zeros(values.shape[1], int), [(bounds, pieces)]
     if not turns.all():
-        tied = dynamics.actuator.nearest(values[0]) is None
-        others = (_drawn_in, _two_pieces, _node_pieces) if tied else (_nearest,)
+        others = [_drawn_in, _two_pieces, _node_pieces]
+        if dynamics.actuator.nearest(values[0]) is not None:
+            others.append(_nearest)
         ways += [way(dynamics, rule, values) for way in others]
         whole = np.broadcast_to([0.0, 1.0], (values.shape[1], 2))
         wanted = _moments(rule, whole, values[:, None])
